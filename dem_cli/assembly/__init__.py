@@ -1,0 +1,28 @@
+"""Where grains and walls are before anything moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dem_cli.assembly.container import build_walls
+from dem_cli.assembly.packing import place_grains
+from dem_cli.scenario import Scenario
+from dem_cli.state import Grains, Walls
+
+__all__ = ["Assembly", "build_assembly"]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Grains and walls at the start of a run."""
+
+    grains: Grains
+    walls: Walls
+
+
+def build_assembly(scenario: Scenario) -> Assembly:
+    """Grains and walls of a scenario; the same seed gives the same assembly. ScenarioError if a packing file is wrong."""
+    generator = np.random.default_rng(scenario.seed)
+    return Assembly(place_grains(scenario, generator), build_walls(scenario))

@@ -1,0 +1,118 @@
+"""`dem check`: validates a scenario and prints what follows from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from dem_cli.cli.derived import Derived
+    from dem_cli.scenario import Scenario
+
+
+@click.command(name="check", short_help="Check a scenario; print derived constants, time step, run time.")
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a key, e.g. grains.count=500.")
+@click.option("--json", "as_json", is_flag=True, help="Print the derived numbers as JSON, in SI units.")
+@click.option("--resolved", is_flag=True, help="Print the scenario with all defaults, in SI units, as TOML.")
+def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved: bool) -> None:
+    """Check SCENARIO without running it.
+
+    Prints all mistakes, or what follows from the scenario: sizes and masses, stiffness and wave speeds, the time step beside its
+    stability limit and the thesis' rule, and the steps, file size and run time to expect.
+    """
+    from dem_cli.scenario import load_scenario
+
+    loaded = load_scenario(scenario, overrides)
+    if resolved:
+        click.echo(loaded.resolved_toml(), nl=False)
+        return
+    from dem_cli.cli.derived import derive
+
+    derived = derive(loaded)
+    if as_json:
+        import json
+
+        click.echo(json.dumps(derived.as_dict(), indent=2, ensure_ascii=False))
+        return
+    for label, text in rows(loaded, derived):
+        click.echo(f"{label:<18}{text}".rstrip())
+    for warning in derived.warnings:
+        click.echo(f"warning: {warning}", err=True)
+
+
+def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
+    """Label and text of each line."""
+    from dem_cli.cli.derived import RATE_GRAIN_STEPS
+
+    walls = scenario.contact.wall_friction
+    by_rule = scenario.integration.time_step == "auto"
+    chosen = (
+        f"{scenario.integration.safety:g} of the limit"
+        if by_rule
+        else f"given, {d.time_step / d.time_step_limit:.2f} of the limit"
+    )
+    lines = [
+        ("scenario", f"{d.title}  (hash {d.hash}, seed {scenario.seed})"),
+        ("grains", f"{d.grains} discs, total mass {human(d.total_mass, 'kg')} at depth {human(scenario.depth, 'm')}"),
+        ("  radius", f"{spread(d.radius, 'm')}  (smallest, mean, largest)"),
+        ("  mass", spread(d.mass, "kg")),
+        (
+            "  expected fill",
+            f"depth {human(d.depth_expected, 'm')}, overlap at the floor {d.overlap_expected:.1e} of a radius",
+        ),
+        ("wave speeds", f"Vp {d.vp:.2f} m/s, Vs {d.vs:.2f} m/s"),
+        ("stiffness", f"kn {d.kn:.4e} N/m, ks {d.ks:.4e} N/m"),
+        (
+            "damping",
+            f"hn {d.hn:.4g}, hs {d.hs:.4g}, restitution {d.restitution:.4g} (tension: {scenario.contact.tension})",
+        ),
+        (
+            "friction",
+            f"grains {scenario.contact.friction:g}, walls {walls.left:g} left, {walls.right:g} right, {walls.bottom:g} floor",
+        ),
+        ("time step", f"{d.time_step:.4e} s  ({chosen})"),
+        ("  limit", f"{d.time_step_limit:.4e} s  (stability, dashpots and contacts included)"),
+        ("  thesis' rule", f"{d.time_step_thesis:.4e} s  (an eighth of the natural period of the lightest grain)"),
+    ]
+    for stage in d.stages:
+        title = f"{stage.kind}" + (f' "{stage.name}"' if stage.name != stage.kind else "")
+        time = human(stage.longest, "s")
+        time = f"about {human(stage.expected, 's', 2)}, at most {time}" if stage.kind == "settle" else time
+        lines.append((f"stage {stage.number}", f"{title}: {time}, {counted(stage.steps)} steps"))
+    return [
+        *lines,
+        ("expected", f"{counted(d.steps)} steps, result file {human(d.file_bytes, 'B', 2)}"),
+        (
+            "  run time",
+            f"{clock(d.run_seconds)} at {RATE_GRAIN_STEPS / 1e6:.0f} million grain-steps per second (one core)",
+        ),
+    ]
+
+
+def human(value: float, unit: str, digits: int = 4) -> str:
+    """A value with a prefix that suits its size: 0.005 m is 5 mm."""
+    if unit in ("m", "s", "B"):
+        for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6)):
+            if abs(value) >= factor and (unit == "B" or factor <= 1.0):
+                return f"{value / factor:.{digits}g} {prefix}{unit}"
+    return f"{value:.{digits}g} {unit}"
+
+
+def counted(number: int) -> str:
+    """A large number to two digits, in groups of three: 350 000."""
+    step = 10 ** max(0, len(str(number)) - 2)
+    return f"{round(number / step) * step:,}".replace(",", " ")
+
+
+def spread(values: tuple[float, float, float], unit: str) -> str:
+    return ", ".join(human(value, unit) for value in values)
+
+
+def clock(seconds: float) -> str:
+    """A time to wait in words: 40 s, 3 min, 2.5 h."""
+    if seconds < 100:
+        return f"about {max(1, round(seconds))} s"
+    return f"about {seconds / 60:.0f} min" if seconds < 7200 else f"about {seconds / 3600:.1f} h"

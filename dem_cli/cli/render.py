@@ -1,0 +1,151 @@
+"""`dem render`: pictures from a result file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import click
+
+
+@click.command(name="render", short_help="Draw a picture from a result file.")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="PICTURE",
+    help="PNG, SVG or PDF [default: FILE-WHAT.png].",
+)
+@click.option(
+    "--what",
+    metavar="KIND",
+    help="sample, histories, trajectories, surface, energy or series [default: sample].",
+)
+@click.option("--time", type=float, metavar="T", help="Sample: the frame nearest to T seconds.")
+@click.option("--frame", type=int, metavar="K", help="Sample: frame K from 0, or -1, -2, ... from the last.")
+@click.option("--last", is_flag=True, help="Sample: the last frame (the default).")
+@click.option("--stage", type=int, metavar="N", help="Only stage N, from 1 (0: whole run); sample: its last frame.")
+@click.option("--color", metavar="QUANTITY", help="Sample: what grains are coloured by [default: displacement].")
+@click.option(
+    "--chains/--no-chains",
+    default=None,
+    help="Sample: lines as wide as the normal force [default: if grains are large enough].",
+)
+@click.option(
+    "--range",
+    "limits",
+    metavar="LOW,HIGH",
+    help="Sample, surface: limits of the colours, SI units.",
+)
+@click.option("--series", metavar="NAME,...", help="Series to draw; implies --what series.")
+@click.option("--grains", metavar="ID,...", help="Histories, trajectories: only these tracked grains.")
+@click.option("--dpi", type=click.FloatRange(20, 1200), default=200.0, show_default=True, help="Resolution of PNG.")
+@click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
+def command(
+    file: Path,
+    output: Path | None,
+    what: str | None,
+    time: float | None,
+    frame: int | None,
+    last: bool,
+    stage: int | None,
+    color: str | None,
+    chains: bool | None,
+    limits: str | None,
+    series: str | None,
+    grains: str | None,
+    dpi: float,
+    force: bool,
+) -> None:
+    """Draw a picture from a result FILE and print its name.
+
+    \b
+    sample        grains to scale, coloured by a quantity, with force chains
+    histories     displacement x, y and rotation of tracked grains
+    trajectories  ways of tracked grains
+    surface       free surface over place and time, and its antisymmetric mode
+    energy        ledger of energy as stacked areas
+    series        any quantity of /series over time
+
+    QUANTITY is radius, id, speed, spin, displacement, displacement_x, displacement_y, rotation, coordination,
+    pressure, shear_stress, stress_xx, stress_yy or stress_xy; displacement and rotation count from the start
+    of the frame's stage. Histories, trajectories and surface show the last stage of shaking unless --stage
+    says otherwise.
+    """
+    # Imported here so that `dem --help` stays quick.
+    from dem_cli.errors import ScenarioError
+    from dem_cli.report.figures import DEFAULT_SERIES, Picture, check_request, choose_frame, draw
+    from dem_cli.report.look import check_target, save, style
+    from dem_cli.results import open_results
+
+    if sum((time is not None, frame is not None, last)) > 1:
+        raise ScenarioError("--time, --frame and --last exclude each other")
+    picture = Picture(
+        what=what or ("series" if series else "sample"),
+        time=time,
+        frame=-1 if last else frame,
+        stage=stage,
+        color=color or "displacement",
+        chains=chains,
+        limits=_pair(limits) if limits else None,
+        series=[name.strip() for name in series.split(",")] if series else DEFAULT_SERIES,
+        grains=_whole(grains) if grains else None,
+    )
+    check_request(picture)
+    moment = time is not None or frame is not None or last
+    given = {
+        "--time/--frame/--last": moment,
+        "--color": color,
+        "--series": series,
+        "--grains": grains,
+        "--range": limits,
+    }
+    _refuse_idle(picture.what, given)
+    target = output or file.with_name(f"{file.stem}-{picture.what}.png")
+    check_target(target, force)
+    with open_results(file) as results:
+        if not results.complete:
+            click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
+        with style():
+            save(draw(results, picture), target, dpi)
+        if time is not None:
+            shown = float(results.frame_times[choose_frame(results, picture)])
+            if abs(shown - time) > 1e-9:
+                click.echo(f"nearest frame: t = {shown:g} s", err=True)
+    click.echo(str(target))
+
+
+def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
+    """Raise ScenarioError for an option that this kind of picture would ignore."""
+    from dem_cli.errors import ScenarioError
+
+    kinds = {
+        "--time/--frame/--last": ("sample",),
+        "--color": ("sample",),
+        "--series": ("series",),
+        "--grains": ("histories", "trajectories"),
+        "--range": ("sample", "surface"),
+    }
+    for option, value in given.items():
+        if value and what not in kinds[option]:
+            raise ScenarioError(f"{option} has no meaning for --what {what}, only for {' and '.join(kinds[option])}")
+
+
+def _pair(text: str) -> tuple[float, float]:
+    from dem_cli.errors import ScenarioError
+
+    try:
+        low, high = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ScenarioError(f'--range "{text}": write two numbers, for example --range 0,0.05') from None
+    return low, high
+
+
+def _whole(text: str) -> list[int]:
+    from dem_cli.errors import ScenarioError
+
+    try:
+        return [int(part) for part in text.split(",")]
+    except ValueError:
+        raise ScenarioError(f'--grains "{text}": write numbers of grains, for example --grains 12,40') from None

@@ -1,0 +1,61 @@
+"""`dem run`: runs a scenario and writes a result file."""
+
+from __future__ import annotations
+
+import signal
+import time
+from pathlib import Path
+
+import click
+
+from dem_cli.cli import INTERRUPTED, Settings
+
+
+@click.command(name="run", short_help="Run a scenario; write a result file.")
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), metavar="FILE", help="Result file [SCENARIO.h5 here].")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change a key, e.g. grains.count=500.")
+@click.option("--report", is_flag=True, help="Print the report when the run is done.")
+@click.option("--force", is_flag=True, help="Overwrite the result file if it exists.")
+@click.pass_obj
+def command(
+    settings: Settings, scenario: Path, output: Path | None, overrides: tuple[str, ...], report: bool, force: bool
+) -> None:
+    """Run SCENARIO and write a result file (HDF5).
+
+    The result file is SCENARIO's name with .h5 in the present folder; it grows under NAME.partial.h5 and takes its own name when
+    it is complete. Ctrl-C ends the run with exit code 130, and a blow-up with 1; what was written stays readable. Progress goes to stderr.
+    """
+    from dem_cli.results.writer import check_target, partial_path
+    from dem_cli.scenario import load_scenario
+
+    loaded = load_scenario(scenario, overrides)
+    target = output or Path(scenario.with_suffix(".h5").name)
+    check_target(target, force=force)
+
+    from dem_cli.cli.progress import Progress, clock
+    from dem_cli.jit import is_cold
+    from dem_cli.run import run_scenario
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    began = time.monotonic()
+    with Progress(loaded, settings.verbosity) as progress:
+        progress.say(f"{loaded.title}: {loaded.grain_count} grains, {len(loaded.stages)} stages, to {target}")
+        if is_cold():
+            progress.say("compiling the kernels, once after installation: about half a minute")
+        try:
+            run_scenario(loaded, target, force=force, listener=progress)
+        except KeyboardInterrupt:
+            progress.say(f"interrupted; what was written is in {partial_path(target)}")
+            raise SystemExit(INTERRUPTED) from None
+        except Exception:
+            if partial_path(target).exists():
+                progress.say(f"stopped; what was written is in {partial_path(target)}")
+            raise
+        progress.say(f"done in {clock(time.monotonic() - began)}: {target}")
+    if report:
+        from dem_cli.cli.report import print_report
+
+        print_report(target)
+    elif settings.verbosity >= 0:
+        click.echo(f"dem report {target} says what came out", err=True)

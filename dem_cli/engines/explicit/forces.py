@@ -1,0 +1,126 @@
+"""Forces of contacts on grains: discs with discs four at a time, walls one by one, both under the law of `law.py`.
+
+Lengths are metres, forces are in units of kn and times in units of the step, so that most factors vanish. A grain is one row
+of eight [x, y, u dt, v dt, q = w r dt, r, kn dt^2/m, r angle], its force one row of four [Fx, Fy, -, M/r] / kn.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dem_cli.engines.explicit.lanes import (
+    WIDTH,
+    gather_difference,
+    gather_sum,
+    load,
+    maximum,
+    root,
+    scatter_action,
+    spread,
+    store,
+    total,
+)
+from dem_cli.engines.explicit.law import contact_force, contact_losses
+from dem_cli.jit import kernel
+
+
+class Pairs(NamedTuple):
+    """Contacts that may open or close soon: flat arrays, a pair an entry, padded to a multiple of WIDTH.
+
+    first, second: int32 rows of the two bodies (second: number of the wall for walls); outer: entry of the list they were taken from,
+    -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn; inertia_root: 1/sqrt(kn dt^2/m_eff).
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    outer: np.ndarray
+    spring: np.ndarray
+    dashpot_n: np.ndarray
+    dashpot_s: np.ndarray
+    inertia_root: np.ndarray
+
+
+@kernel(inline=True)
+def wall_direction(x, y, walls, w):
+    """Unit vector from a point to the nearest point of wall w, and their distance (the wall may be met at its end)."""
+    ex, ey = walls[w, 2] - walls[w, 0], walls[w, 3] - walls[w, 1]
+    along = ((x - walls[w, 0]) * ex + (y - walls[w, 1]) * ey) / (ex * ex + ey * ey)
+    along = min(max(along, 0.0), 1.0)
+    dx, dy = walls[w, 0] + along * ex - x, walls[w, 1] + along * ey - y
+    distance = np.sqrt(dx * dx + dy * dy)
+    inverse = 1.0 / distance if distance > 0.0 else 0.0
+    return dx * inverse, dy * inverse, distance
+
+
+@kernel(inline=True)
+def disc_geometry(rows, pairs, k):
+    """Where the pairs k..k+3 touch and how they move: lanes (nx, ny, overlap, closing, sliding), displacements of the last step."""
+    dx, dy, du, dv = gather_difference(rows, pairs.first, pairs.second, k)
+    turning, reach = gather_sum(rows, pairs.first, pairs.second, k)
+    distance = root(dx * dx + dy * dy)
+    inverse = 1.0 / distance
+    nx, ny = dx * inverse, dy * inverse
+    return nx, ny, reach - distance, -(du * nx + dv * ny), dv * nx - du * ny - turning
+
+
+@kernel(inline=True)
+def pair_law(forces, pairs, k, geometry, law, lost):
+    """Law, forces on the grains, and memory of the pairs k..k+3; returns the losses so far, lanes."""
+    nx, ny, overlap, closing, sliding = geometry
+    spring = load(pairs.spring, k)
+    normal, shear, stretched = contact_force(overlap, closing, sliding, spring, load(pairs.inertia_root, k), law.friction, law)
+    scatter_action(forces, pairs.first, pairs.second, k, normal * nx + shear * ny, normal * ny - shear * nx, shear)
+    old = (load(pairs.dashpot_n, k), load(pairs.dashpot_s, k), spring)
+    new = (normal - maximum(overlap, 0.0), shear - stretched, stretched)
+    n, s, f, c = contact_losses(overlap, closing, sliding, old, new, law)
+    store(pairs.spring, k, stretched)
+    store(pairs.dashpot_n, k, new[0])
+    store(pairs.dashpot_s, k, new[1])
+    return lost[0] + n, lost[1] + s, lost[2] + f, lost[3] + c
+
+
+@kernel()
+def pair_forces(rows, forces, pairs, law, losses):
+    """Forces of all pairs of discs on their grains; memory and losses (4,) are updated in place.
+
+    losses: twice the energies of contact_losses, in units of kn. The geometry of a group of pairs is worked out while the
+    law of the group before is: both wait long for their own results, so they run in each other's shade.
+    """
+    zero = spread(0.0)
+    lost = (zero, zero, zero, zero)
+    behind = disc_geometry(rows, pairs, 0)
+    for k in range(WIDTH, pairs.first.size, WIDTH):
+        ahead = disc_geometry(rows, pairs, k)
+        lost = pair_law(forces, pairs, k - WIDTH, behind, law, lost)
+        behind = ahead
+    lost = pair_law(forces, pairs, pairs.first.size - WIDTH, behind, law, lost)
+    for m in range(4):
+        losses[m] += total(lost[m])
+
+
+@kernel()
+def wall_forces(rows, forces, pairs, walls, law, losses):
+    """Forces of walls, bodies of infinite mass and no curvature, on grains under the same law, one contact at a time."""
+    for k in range(pairs.first.size):
+        i, w = pairs.first[k], pairs.second[k]
+        a = 8 * i
+        nx, ny, distance = wall_direction(rows[a], rows[a + 1], walls, w)
+        overlap = rows[a + 5] - distance
+        closing = rows[a + 2] * nx + rows[a + 3] * ny
+        sliding = rows[a + 2] * ny - rows[a + 3] * nx - rows[a + 4]
+        spring = pairs.spring[k]
+        normal, shear, stretched = contact_force(overlap, closing, sliding, spring, pairs.inertia_root[k], walls[w, 4], law)
+        f = 4 * i
+        forces[f] -= normal * nx + shear * ny
+        forces[f + 1] -= normal * ny - shear * nx
+        forces[f + 3] += shear
+        old = (pairs.dashpot_n[k], pairs.dashpot_s[k], spring)
+        new = (normal - max(overlap, 0.0), shear - stretched, stretched)
+        n, s, f_, c = contact_losses(overlap, closing, sliding, old, new, law)
+        losses[0] += n
+        losses[1] += s
+        losses[2] += f_
+        losses[3] += c
+        pairs.spring[k], pairs.dashpot_n[k], pairs.dashpot_s[k] = stretched, new[0], new[1]

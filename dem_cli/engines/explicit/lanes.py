@@ -1,0 +1,299 @@
+"""Four numbers at once: a vector type for kernels, so that one formula serves a single contact and four of them.
+
+`Lanes` holds four doubles in one register. It knows + - * /, comparison, and the functions below; those for numbers also take plain
+floats, so a law written with them compiles for both. Rows lie in flat float64 arrays. Nothing checks bounds here: the callers pad their lists to a multiple of WIDTH.
+The code is portable LLVM, not tied to one processor, and lanes never mix in a sum, so that their number does not move results.
+"""
+
+from __future__ import annotations
+
+import operator
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.datamodel import models
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, register_model
+
+WIDTH = 4
+_DOUBLE = ir.DoubleType()
+_VECTOR = ir.VectorType(_DOUBLE, WIDTH)
+_FLAGS = ("contract",)
+
+
+class LanesType(types.Type):
+    """Numba type of four doubles."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Lanes")
+
+
+class MaskType(types.Type):
+    """Numba type of four truth values, made by comparing lanes."""
+
+    def __init__(self) -> None:
+        super().__init__(name="LanesMask")
+
+
+lanes = LanesType()
+mask = MaskType()
+
+
+@register_model(LanesType)
+class _LanesModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _VECTOR)
+
+
+@register_model(MaskType)
+class _MaskModel(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, ir.VectorType(ir.IntType(1), WIDTH))
+
+
+def _spread(builder: Any, value: Any) -> Any:
+    """A scalar in all lanes; a vector as it is."""
+    if value.type == _VECTOR:
+        return value
+    undefined = ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(undefined, value, ir.Constant(ir.IntType(32), 0))
+    zeros = ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(first, undefined, zeros)
+
+
+_MIXED = ((lanes, lanes), (lanes, types.float64), (types.float64, lanes))
+
+
+def _define(operation: Any, result: types.Type, emit: Any) -> None:
+    """Teach Numba `operation` on lanes; a float beside lanes is spread over them."""
+
+    class Template(ConcreteTemplate):
+        cases = [signature(result, *pair) for pair in _MIXED]  # noqa: RUF012 (Numba's protocol)
+
+    infer_global(operation)(Template)
+    for pair in _MIXED:
+
+        @lower_builtin(operation, *pair)
+        def lower(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+            return emit(builder, _spread(builder, args[0]), _spread(builder, args[1]))
+
+
+_define(operator.add, lanes, lambda b, x, y: b.fadd(x, y, flags=_FLAGS))
+_define(operator.sub, lanes, lambda b, x, y: b.fsub(x, y, flags=_FLAGS))
+_define(operator.mul, lanes, lambda b, x, y: b.fmul(x, y, flags=_FLAGS))
+_define(operator.truediv, lanes, lambda b, x, y: b.fdiv(x, y, flags=_FLAGS))
+_define(operator.gt, mask, lambda b, x, y: b.fcmp_ordered(">", x, y))
+_define(operator.lt, mask, lambda b, x, y: b.fcmp_ordered("<", x, y))
+
+
+@infer_global(operator.neg)
+class _Negative(ConcreteTemplate):
+    cases = [signature(lanes, lanes)]  # noqa: RUF012
+
+
+@lower_builtin(operator.neg, lanes)
+def _negative(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+    return builder.fneg(args[0])
+
+
+def _common(x: types.Type, y: types.Type) -> types.Type:
+    return lanes if lanes in (x, y) else types.float64
+
+
+def _operands(context: Any, builder: Any, sig: Any, args: Any) -> list[Any]:
+    """Arguments as the result's kind: all lanes, or all doubles."""
+    out = []
+    for value, kind in zip(args, sig.args, strict=True):
+        if kind is not lanes:
+            value = context.cast(builder, value, kind, types.float64)
+        out.append(_spread(builder, value) if sig.return_type == lanes else value)
+    return out
+
+
+def _selection(sign: str) -> Any:
+    def typed(_typing: Any, x: Any, y: Any) -> Any:
+        def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            x, y = _operands(context, builder, sig, args)
+            return builder.select(builder.fcmp_ordered(sign, x, y), x, y)
+
+        return _common(x, y)(x, y), emit
+
+    return typed
+
+
+@intrinsic
+def maximum(typing, x, y):
+    """The larger one; `y` where either is NaN."""
+    return _selection(">")(typing, x, y)
+
+
+@intrinsic
+def minimum(typing, x, y):
+    """The smaller one; `y` where either is NaN."""
+    return _selection("<")(typing, x, y)
+
+
+@intrinsic
+def where(_typing, condition, x, y):
+    """`x` where the condition holds, else `y`."""
+
+    def emit(context, builder, sig, args):
+        x, y = _operands(context, builder, sig.return_type(*sig.args[1:]), args[1:])
+        return builder.select(args[0], x, y)
+
+    return _common(x, y)(condition, x, y), emit
+
+
+@intrinsic
+def root(_typing, x):
+    """Square root."""
+
+    def emit(_context, builder, sig, args):
+        kind, name = (_VECTOR, f"llvm.sqrt.v{WIDTH}f64") if sig.return_type == lanes else (_DOUBLE, "llvm.sqrt.f64")
+        function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
+        return builder.call(function, [args[0]])
+
+    return x(x), emit
+
+
+@intrinsic
+def spread(_typing, x):
+    """The float x in all lanes."""
+
+    def emit(_context, builder, _sig, args):
+        return _spread(builder, args[0])
+
+    return lanes(x), emit
+
+
+@intrinsic
+def total(_typing, x):
+    """Sum of the lanes, in order."""
+
+    def emit(_context, builder, _sig, args):
+        parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(WIDTH)]
+        out = parts[0]
+        for part in parts[1:]:
+            out = builder.fadd(out, part)
+        return out
+
+    return types.float64(x), emit
+
+
+# -- memory ---------------------------------------------------------------------------------------------------------
+
+
+def _data(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    return context.make_array(kind)(context, builder, value).data
+
+
+def _read(builder: Any, data: Any, index: Any) -> Any:
+    return builder.load(_pointer(builder, data, index), align=8)
+
+
+def _write(builder: Any, value: Any, data: Any, index: Any) -> None:
+    builder.store(value, _pointer(builder, data, index), align=8)
+
+
+def _pointer(builder: Any, data: Any, index: Any) -> Any:
+    return builder.bitcast(builder.gep(data, [index], inbounds=True), _VECTOR.as_pointer())
+
+
+def _word(value: int) -> Any:
+    return ir.Constant(ir.IntType(64), value)
+
+
+def _rows(builder: Any, list_data: Any, k: Any, stride: int) -> list[Any]:
+    """Offsets of the rows that entries k..k+3 of an int32 list point to."""
+    out = []
+    for lane in range(WIDTH):
+        at = builder.gep(list_data, [builder.add(k, _word(lane))], inbounds=True)
+        out.append(builder.mul(builder.zext(builder.load(at), ir.IntType(64)), _word(stride)))
+    return out
+
+
+def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
+    return builder.shuffle_vector(x, y, ir.Constant(ir.VectorType(ir.IntType(32), len(order)), order))
+
+
+def _transpose(builder: Any, rows: list[Any], columns: int = WIDTH) -> list[Any]:
+    """Four rows of four -> their first `columns` columns."""
+    even = [_shuffle(builder, rows[k], rows[k + 1], [0, 4, 2, 6]) for k in (0, 2)]
+    odd = [_shuffle(builder, rows[k], rows[k + 1], [1, 5, 3, 7]) for k in (0, 2)]
+    low, high = [0, 1, 4, 5], [2, 3, 6, 7]
+    out = [_shuffle(builder, *even, low), _shuffle(builder, *odd, low)]
+    if columns == WIDTH:
+        out += [_shuffle(builder, *even, high), _shuffle(builder, *odd, high)]
+    return out
+
+
+@intrinsic
+def load(_typing, array, k):
+    """array[k:k+4]."""
+
+    def emit(context, builder, sig, args):
+        return _read(builder, _data(context, builder, sig.args[0], args[0]), args[1])
+
+    return lanes(array, types.intp), emit
+
+
+@intrinsic
+def store(_typing, array, k, value):
+    """array[k:k+4] = value."""
+
+    def emit(context, builder, sig, args):
+        _write(builder, args[2], _data(context, builder, sig.args[0], args[0]), args[1])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, value), emit
+
+
+@intrinsic
+def gather_difference(_typing, rows, first, second, k):
+    """Columns 0..3 of rows[second] - rows[first], rows of eight, for the pairs k..k+3 of two index lists."""
+
+    def emit(context, builder, sig, args):
+        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
+        i, j = _rows(builder, one, args[3], 8), _rows(builder, two, args[3], 8)
+        parts = [builder.fsub(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)]
+        return context.make_tuple(builder, sig.return_type, _transpose(builder, parts))
+
+    return types.UniTuple(lanes, 4)(rows, first, second, types.intp), emit
+
+
+@intrinsic
+def gather_sum(_typing, rows, first, second, k):
+    """Columns 4 and 5 of rows[second] + rows[first], rows of eight, for the pairs k..k+3 of two index lists."""
+
+    def emit(context, builder, sig, args):
+        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
+        i, j = _rows(builder, one, args[3], 8), _rows(builder, two, args[3], 8)
+        parts = []
+        for m in range(WIDTH):
+            a, b = (_read(builder, data, builder.add(row[m], _word(4))) for row in (j, i))
+            parts.append(builder.fadd(a, b, flags=_FLAGS))
+        return context.make_tuple(builder, sig.return_type, _transpose(builder, parts, 2))
+
+    return types.UniTuple(lanes, 2)(rows, first, second, types.intp), emit
+
+
+@intrinsic
+def scatter_action(_typing, rows, first, second, k, x, y, turn):
+    """Action and reaction of the pairs k..k+3, pair after pair: rows of four take (x, y, 0, turn) on second, (-x, -y, 0, turn) on first."""
+
+    def emit(context, builder, sig, args):
+        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
+        i, j = _rows(builder, one, args[3], 4), _rows(builder, two, args[3], 4)
+        zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
+        columns = _transpose(builder, [args[4], args[5], zero, args[6]])
+        integers = ir.VectorType(ir.IntType(64), WIDTH)
+        signs = ir.Constant(integers, [-(1 << 63), -(1 << 63), 0, 0])
+        for m in range(WIDTH):
+            turned = builder.bitcast(builder.xor(builder.bitcast(columns[m], integers), signs), _VECTOR)
+            for row, value in ((i[m], turned), (j[m], columns[m])):
+                _write(builder, builder.fadd(_read(builder, data, row), value), data, row)
+        return context.get_dummy_value()
+
+    return types.void(rows, first, second, types.intp, x, y, turn), emit

@@ -1,0 +1,46 @@
+"""The one decorator for compiled kernels, and the folder that their machine code is kept in.
+
+Numba's own cache misses edits in other files that a kernel calls. So the folder is named by a hash of all kernel sources: an
+edit anywhere gives a new folder, and unchanged sources find theirs. It lies beside the user's other caches, so
+that a read-only installation works too; `NUMBA_CACHE_DIR` overrides it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+
+
+def _cache_folder() -> Path:
+    package = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if b"jit import kernel" in text or source == Path(__file__):
+            digest.update(text)
+    root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return root / "dem-cli" / f"numba-{digest.hexdigest()[:16]}"
+
+
+if "NUMBA_CACHE_DIR" not in os.environ:
+    numba.config.CACHE_DIR = str(_cache_folder())
+
+
+def kernel(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
+    """Decorator of every compiled function: cached, IEEE arithmetic save that a*b + c may be fused.
+
+    inline: merge the machine code into its callers (small functions of inner loops).
+    NaN and the order of sums are kept, so the same scenario gives the same bits on one machine.
+    """
+    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=inline)
+
+
+def is_cold() -> bool:
+    """Whether the cache holds no machine code of the present sources yet: the first run will compile."""
+    return not any(Path(numba.config.CACHE_DIR).rglob("*.nbi"))

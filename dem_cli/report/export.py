@@ -1,0 +1,111 @@
+"""A run as CSV tables: series, stages, surface and tracks, units in the header, every bit of every number
+kept.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.report.summary import MEASURES, Summary
+from dem_cli.results import Results
+from dem_cli.results.schema import SERIES, TRACKS
+
+Row = Sequence[object]
+
+
+def folders(files: Sequence[Path], folder: Path) -> list[Path]:
+    """Where the tables of each file go: `folder` itself for one file, else a folder below it named for the
+    file.
+
+    Raises ScenarioError if two files would share one.
+    """
+    if len(files) == 1:
+        return [folder]
+    places = [folder / path.stem for path in files]
+    double = next((place for place in places if places.count(place) > 1), None)
+    if double is not None:
+        raise ScenarioError(f"--csv: two files would write to {double}; write them one at a time")
+    return places
+
+
+def export_csv(results: Results, summary: Summary, folder: Path, force: bool = False) -> list[Path]:
+    """Write the tables that the file holds into `folder` (made if absent) and return their paths.
+
+    series.csv has a row a time and a column a quantity; stages.csv a row a stage; surface.csv a row a time
+    and place; tracks.csv a row a time and grain. NaN is written as nan. Raises ResultsError if one of the
+    files exists and `force` is not set; then nothing is written.
+    """
+    tables = {
+        "series.csv": _series(results),
+        "stages.csv": _stages(summary),
+        "surface.csv": _surface(results),
+    }
+    if results.tracks is not None:
+        tables["tracks.csv"] = _tracks(results)
+    paths = {name: folder / name for name in tables}
+    there = [str(path) for path in paths.values() if path.exists()]
+    if there and not force:
+        raise ResultsError(f"{', '.join(there)} exists; choose another folder or add --force")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, rows in tables.items():
+            with paths[name].open("w", newline="", encoding="utf-8") as stream:
+                csv.writer(stream, lineterminator="\n").writerows(rows)
+    except OSError as error:
+        raise ResultsError(f"{folder}: cannot be written: {error.strerror}") from None
+    return list(paths.values())
+
+
+def _series(results: Results) -> Iterator[Row]:
+    names = list(results.series)
+    if "time" not in names:
+        names.insert(0, "time")
+    yield [_head(name, results.series.unit(name)) for name in names]
+    yield from zip(*(np.asarray(results.series[name]).tolist() for name in names), strict=True)
+
+
+def _stages(summary: Summary) -> Iterator[Row]:
+    measures = [_head(f"{name} {when}", SERIES[name][0]) for when in ("before", "after") for name in MEASURES]
+    yield [
+        "stage",
+        "name",
+        "kind",
+        "start [s]",
+        "end [s]",
+        "reason",
+        "amplitude [m/s^2]",
+        "frequency [Hz]",
+        *measures,
+    ]
+    for s in summary.stages:
+        values = [state[name] for state in (s.before, s.after) for name in MEASURES]
+        yield [s.number, s.name, s.kind, s.start, s.end, s.reason, s.amplitude, s.frequency, *values]
+
+
+def _surface(results: Results) -> Iterator[Row]:
+    yield ["time [s]", "x [m]", "eta [m]"]
+    surface = results.surface
+    x = np.asarray(surface.x).tolist()
+    for time, eta in zip(np.asarray(surface.time).tolist(), np.asarray(surface.eta).tolist(), strict=True):
+        yield from zip([time] * len(x), x, eta, strict=True)
+
+
+def _tracks(results: Results) -> Iterator[Row]:
+    tracks = results.tracks
+    if tracks is None:
+        return
+    names = [name for name in TRACKS if name in tracks.arrays]
+    yield ["time [s]", "grain", *(_head(name, TRACKS[name][0]) for name in names)]
+    ids: Iterable[int] = np.asarray(tracks.ids).tolist()
+    columns = [np.asarray(tracks.arrays[name]) for name in names]
+    for k, time in enumerate(np.asarray(tracks.time).tolist()):
+        yield from zip([time] * len(tracks.ids), ids, *(column[k].tolist() for column in columns), strict=True)
+
+
+def _head(name: str, unit: str) -> str:
+    return name if unit in ("", "1") else f"{name} [{unit}]"

@@ -1,0 +1,334 @@
+"""What one result file says, as one tree of numbers. Text, JSON and comparisons are made from it and from
+nothing else.
+
+All values are SI; NaN where a quantity is not defined. `as_dict` gives the tree as `dem report --json` prints
+it: the keys are the names of the fields here, NaN becomes null. Measures keep the names they have under
+/series.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dem_cli import units
+from dem_cli.analysis.sloshing import surface_period, theory_period, thesis_period
+from dem_cli.results import Results, Stage
+from dem_cli.state import Floats
+
+FORMAT = "dem-cli summary"
+FORMAT_VERSION = 1
+
+# Measures of the sample shown before and after a stage.
+MEASURES = (
+    "void_ratio",
+    "porosity",
+    "void_ratio_inner",
+    "porosity_inner",
+    "depth",
+    "roughness",
+    "coordination",
+    "airborne",
+    "escaped",
+    "max_overlap",
+)
+STORED = ("kinetic", "potential", "elastic_normal", "elastic_tangential")
+LOST = ("friction", "dashpot_normal", "dashpot_tangential", "damping", "escaped_energy")
+# Share of the energy put in that the ledger may fail to account for.
+RESIDUAL_LIMIT = 1e-3
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was run. width, height (NaN: walls without end), depth (of the cylinders) [m]; wall_time [s] of
+    computing.
+
+    simulated_time [s]; steps_per_second and grain_steps_per_second are per second of wall_time.
+    """
+
+    file: str
+    title: str
+    engine: str
+    version: str
+    scenario_hash: str
+    seed: int
+    grains: int
+    width: float
+    height: float
+    depth: float
+    complete: bool
+    stop_reason: str
+    simulated_time: float
+    steps: float
+    wall_time: float
+    steps_per_second: float
+    grain_steps_per_second: float
+
+
+@dataclass(frozen=True)
+class Sloshing:
+    """Motion of the surface in one stage of shaking beside a liquid's of the same depth; periods [s], lengths
+    [m].
+
+    depth: before the stage. theory_T1..T3: linear theory at that depth; thesis_T1: the thesis' (7.2).
+    driving_period: of the shaking. period, amplitude: strongest oscillation of the surface mode cos(pi x/l);
+    resolution [Hz] of the record and period_resolution [s]; ratio: period over driving period; free_period,
+    free_amplitude: strongest beside the driving one; mode_largest: largest magnitude of the mode. reason: why
+    no period was found, else empty.
+    """
+
+    depth: float
+    theory_T1: float  # noqa: N815 - the symbol of theory and thesis
+    theory_T2: float  # noqa: N815
+    theory_T3: float  # noqa: N815
+    thesis_T1: float  # noqa: N815
+    driving_period: float
+    period: float
+    amplitude: float
+    resolution: float
+    period_resolution: float
+    ratio: float
+    is_driving: bool
+    free_period: float
+    free_amplitude: float
+    mode_largest: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class StageSummary:
+    """One stage. start, end [s] (NaN: not ended); before, after, change: MEASURES at its ends, `after` of a
+    stage that has not ended being its last row; amplitude [m/s^2] and frequency
+    [Hz] of shaking.
+
+    overlap_largest, airborne_largest: largest over all rows of the stage's series.
+    """
+
+    number: int
+    name: str
+    kind: str
+    start: float
+    end: float
+    reason: str
+    amplitude: float
+    frequency: float
+    before: dict[str, float]
+    after: dict[str, float]
+    change: dict[str, float]
+    overlap_largest: float
+    airborne_largest: float
+    sloshing: Sloshing | None
+
+
+@dataclass(frozen=True)
+class EnergySummary:
+    """Ledger of energy at the end of the series [J]. stored_start: stored at its first row.
+
+    Balance: stored_start + work + time_step_energy = stored_total + lost_total + residual. residual_ratio:
+    |residual| over energy_in; residual_largest_ratio: the same for the largest |residual| of the run.
+    """
+
+    stored: dict[str, float]
+    stored_total: float
+    stored_start: float
+    lost: dict[str, float]
+    lost_total: float
+    work: float
+    time_step_energy: float
+    energy_in: float
+    residual: float
+    residual_ratio: float
+    residual_largest_ratio: float
+
+
+@dataclass(frozen=True)
+class Summary:
+    run: Run
+    stages: tuple[StageSummary, ...]
+    energy: EnergySummary | None
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Tree for JSON: no NaN, no infinity (both null), no tuples."""
+        tree: dict[str, Any] = _plain(dataclasses.asdict(self))
+        return {"format": FORMAT, "format_version": FORMAT_VERSION, **tree}
+
+
+def summary(results: Results) -> Summary:
+    """Summary of a result file, complete or not."""
+    run = _run(results)
+    energy = _energy(results)
+    stages = tuple(_stage(results, number, stage) for number, stage in enumerate(results.stages, start=1))
+    return Summary(run=run, stages=stages, energy=energy, warnings=tuple(_warnings(results, run, energy)))
+
+
+def _run(results: Results) -> Run:
+    attrs = results.attrs
+    time, step = (np.asarray(results.series[name], dtype=float) for name in ("time", "step"))
+    grains = int(attrs.get("grains", 0))
+    steps = float(step[-1]) if len(step) else 0.0
+    wall = float(attrs.get("wall_time", math.nan))
+    rate = steps / wall if wall > 0.0 else math.nan
+    return Run(
+        file=str(results.path),
+        title=results.title,
+        engine=str(attrs.get("engine", "")),
+        version=str(attrs.get("program_version", "")),
+        scenario_hash=str(attrs.get("scenario_hash", "")),
+        seed=int(attrs.get("seed", 0)),
+        grains=grains,
+        width=float(results.width),
+        height=math.nan if results.height is None else float(results.height),
+        depth=float(results.depth),
+        complete=results.complete,
+        stop_reason=results.stop_reason,
+        simulated_time=float(time[-1] - time[0]) if len(time) else 0.0,
+        steps=steps,
+        wall_time=wall,
+        steps_per_second=rate,
+        grain_steps_per_second=rate * grains,
+    )
+
+
+def _stage(results: Results, number: int, stage: Stage) -> StageSummary:
+    inside = _rows_of(results, number)
+    before = {name: float(stage.before.get(name, math.nan)) for name in MEASURES}
+    after = {name: float(stage.after.get(name, math.nan)) for name in MEASURES}
+    if not stage.after and inside.any():
+        after = {name: float(results.series[name][inside][-1]) for name in MEASURES}
+    given = _given(results, number)
+    return StageSummary(
+        number=number,
+        name=stage.name,
+        kind=stage.kind,
+        start=float(stage.start),
+        end=float(stage.end),
+        reason=stage.reason,
+        amplitude=_quantity(given, "amplitude", "m/s^2"),
+        frequency=_quantity(given, "frequency", "Hz"),
+        before=before,
+        after=after,
+        change={name: after[name] - before[name] for name in MEASURES},
+        overlap_largest=_largest(np.asarray(results.series["max_overlap"])[inside]),
+        airborne_largest=_largest(np.asarray(results.series["airborne"])[inside]),
+        sloshing=_sloshing(results, number, before["depth"]) if stage.kind == "shake" else None,
+    )
+
+
+def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
+    container = results.scenario.get("container", {})
+    gravity = _quantity(container, "gravity", "m/s^2")
+    direction = _quantity(container, "gravity_direction", "rad")
+    if math.isfinite(direction):
+        gravity *= -math.sin(direction)  # what pulls the surface level
+    frequency = _quantity(_given(results, number), "frequency", "Hz")
+    inside = _rows_of(results, number)
+    mode = np.asarray(results.series["mode1"], dtype=float)[inside]
+    radius = float(results.frame(0).grains.radius.mean()) if results.n_frames else 0.0
+    # The end of one stage and the start of the next may be two rows of the same time.
+    time, row = np.unique(np.asarray(results.series["time"], dtype=float)[inside], return_index=True)
+    found = surface_period(
+        time,
+        mode[row],
+        mean_radius=radius,
+        driving_period=1.0 / frequency if frequency > 0.0 else None,
+    )
+    width = results.width
+    return Sloshing(
+        depth=depth,
+        theory_T1=theory_period(1, width, depth, gravity),
+        theory_T2=theory_period(2, width, depth, gravity),
+        theory_T3=theory_period(3, width, depth, gravity),
+        thesis_T1=thesis_period(width, depth, gravity),
+        driving_period=1.0 / frequency if frequency > 0.0 else math.nan,
+        period=found.period,
+        amplitude=found.amplitude,
+        resolution=found.resolution,
+        period_resolution=found.period_resolution,
+        ratio=found.ratio,
+        is_driving=found.is_driving,
+        free_period=found.free_period,
+        free_amplitude=found.free_amplitude,
+        mode_largest=_largest(np.abs(mode)),
+        reason=found.reason,
+    )
+
+
+def _energy(results: Results) -> EnergySummary | None:
+    if len(results.series["time"]) == 0:
+        return None
+    end = {
+        name: float(results.series[name][-1])
+        for name in (*STORED, *LOST, "work", "time_step_energy", "energy_in", "residual")
+    }
+    largest = _largest(np.abs(np.asarray(results.series["residual"], dtype=float)))
+    scale = end["energy_in"] if end["energy_in"] > 0.0 else math.nan
+    return EnergySummary(
+        stored={name: end[name] for name in STORED},
+        stored_total=sum(end[name] for name in STORED),
+        stored_start=sum(float(results.series[name][0]) for name in STORED),
+        lost={name: end[name] for name in LOST},
+        lost_total=sum(end[name] for name in LOST),
+        work=end["work"],
+        time_step_energy=end["time_step_energy"],
+        energy_in=end["energy_in"],
+        residual=end["residual"],
+        residual_ratio=abs(end["residual"]) / scale,
+        residual_largest_ratio=largest / scale,
+    )
+
+
+def _warnings(results: Results, run: Run, energy: EnergySummary | None) -> list[str]:
+    lines = []
+    if not run.complete:
+        lines.append(f"the run is incomplete ({run.stop_reason or 'it was cut off'}); numbers hold up to its last row")
+    if energy is None:
+        lines.append("the file holds no series yet")
+    elif energy.residual_largest_ratio > RESIDUAL_LIMIT:
+        lines.append(
+            f"energy: the ledger misses {energy.residual_largest_ratio:.2g} of the energy put in "
+            f"(limit {RESIDUAL_LIMIT:g}): take a smaller time step"
+        )
+    return [*lines, *results.warnings]
+
+
+def _rows_of(results: Results, number: int) -> Any:
+    """Rows of the series within stage `number`, both ends included."""
+    stage = results.stages[number - 1]
+    time = np.asarray(results.series["time"])
+    stop = stage.end if math.isfinite(stage.end) else math.inf
+    tiny = 1e-9 * max(1.0, abs(stage.start))
+    return (time >= stage.start - tiny) & (time <= stop + tiny)
+
+
+def _given(results: Results, number: int) -> dict[str, Any]:
+    """The stage's table in the scenario, empty if there is none."""
+    tables = results.scenario.get("stage", [])
+    return dict(tables[number - 1]) if number <= len(tables) else {}
+
+
+def _quantity(table: dict[str, Any], key: str, unit: str) -> float:
+    """`table[key]` in `unit`; NaN where the key is absent."""
+    value = table.get(key)
+    if isinstance(value, str):
+        return units.parse(value, unit)
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def _largest(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if len(finite) else math.nan
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,150 @@
+"""Names, units and meanings of what a result file holds: used by the writer, the reader, the reports and the README."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+FORMAT = "dem-cli results"
+FORMAT_VERSION = 1
+
+# Series over time: name -> (unit, definition). The writer stores both as attributes of the dataset.
+SERIES: dict[str, tuple[str, str]] = {
+    "time": ("s", "simulated time"),
+    "step": ("1", "number of time steps done"),
+    "stage": ("1", "number of the stage, from 0"),
+    "time_step": ("s", "time step in use"),
+    "void_ratio": ("1", "voids over solids of the whole fill: container width x mean surface height"),
+    "porosity": ("1", "voids over total of the whole fill"),
+    "void_ratio_inner": ("1", "voids over solids of the inner window, grains clipped exactly"),
+    "porosity_inner": ("1", "voids over total of the inner window, grains clipped exactly"),
+    "depth": ("m", "fill depth: mean height of the free surface"),
+    "roughness": ("m", "standard deviation of the free surface about its straight line of best fit"),
+    "mode1": ("m", "amplitude of the antisymmetric surface mode cos(pi x / l)"),
+    "coordination": ("1", "contacts per grain in the fill; a contact of two grains counts for both, one with a wall once"),
+    "contacts": ("1", "number of contacts"),
+    "sliding": ("1", "share of contacts at the friction limit"),
+    "airborne": ("1", "grains above the fill that touch nothing joined to it"),
+    "escaped": ("1", "grains that have left the container"),
+    "fabric_xx": ("1", "fabric tensor <n n> of contacts between grains"),
+    "fabric_xy": ("1", "fabric tensor <n n> of contacts between grains"),
+    "fabric_yy": ("1", "fabric tensor <n n> of contacts between grains"),
+    "stress_xx": ("Pa", "mean stress of the inner window, compression > 0"),
+    "stress_xy": ("Pa", "mean stress of the inner window, symmetric part"),
+    "stress_yy": ("Pa", "mean stress of the inner window, compression > 0"),
+    "stress_asymmetry": ("Pa", "(stress_xy - stress_yx)/2 before the symmetric part was taken, a check"),
+    "unbalanced": ("1", "mean resultant force on a grain over mean contact force"),
+    "max_overlap": ("1", "largest overlap over the smaller radius of the two bodies"),
+    "center_x": ("m", "centre of mass of the grains in the container"),
+    "center_y": ("m", "centre of mass of the grains in the container"),
+    "kinetic": ("J", "kinetic energy, rotation included"),
+    "potential": ("J", "potential energy of gravity, zero at y = 0"),
+    "elastic_normal": ("J", "energy of normal springs"),
+    "elastic_tangential": ("J", "energy of tangential springs"),
+    "friction": ("J", "lost to friction since the start"),
+    "dashpot_normal": ("J", "lost to normal dashpots since the start"),
+    "dashpot_tangential": ("J", "lost to tangential dashpots since the start"),
+    "damping": ("J", "lost to extra damping since the start"),
+    "escaped_energy": ("J", "carried off by grains that left the container"),
+    "time_step_energy": ("J", "gained (+) or lost (-) because contacts open and close within a time step"),
+    "work": ("J", "work of the shaking on the grains since the start"),
+    "energy_in": ("J", "energy put in since the start: potential energy set free and positive work"),
+    "residual": ("J", "energy that the ledger cannot account for"),
+    "ground_x": ("m", "displacement of the container"),
+    "ground_y": ("m", "displacement of the container"),
+    "ground_vx": ("m/s", "velocity of the container"),
+    "ground_vy": ("m/s", "velocity of the container"),
+    "ground_ax": ("m/s^2", "acceleration of the container"),
+    "ground_ay": ("m/s^2", "acceleration of the container"),
+}
+
+# Tracks of chosen grains over /tracks/time, shape (times, grains), in the container's frame.
+TRACKS: dict[str, tuple[str, str]] = {
+    "x": ("m", "position"),
+    "y": ("m", "position"),
+    "angle": ("rad", "rotation, anticlockwise"),
+    "vx": ("m/s", "velocity"),
+    "vy": ("m/s", "velocity"),
+    "spin": ("rad/s", "angular velocity"),
+}
+
+# The free surface over /surface/time and /surface/x.
+SURFACE: dict[str, tuple[str, str]] = {
+    "x": ("m", "centre of a bin"),
+    "eta": ("m", "height of the free surface, airborne grains left out"),
+}
+
+# Stages, over /stages/stage; `before` and `after` over /stages/quantity too.
+STAGES: dict[str, tuple[str, str]] = {
+    "stage": ("1", "number of the stage, from 0"),
+    "name": ("1", "name in the scenario"),
+    "kind": ("1", "settle, shake, run"),
+    "start": ("s", "simulated time"),
+    "end": ("s", "simulated time, NaN if the stage has not ended"),
+    "reason": ("1", "why it ended"),
+    "before": ("1", "series at the start, in the units of /stages/units"),
+    "after": ("1", "series at the end, in the units of /stages/units"),
+}
+
+# What a frame holds beside grains and contacts, over /frames/time.
+FRAMES: dict[str, tuple[str, str]] = {
+    **{name: SERIES[name] for name in ("time", "step", "stage", "time_step")},
+    **{f"ground_{name}": SERIES[f"ground_{name}"] for name in ("x", "y", "vx", "vy", "ax", "ay")},
+    "kinetic": SERIES["kinetic"],
+    "potential": SERIES["potential"],
+    "elastic_normal": SERIES["elastic_normal"],
+    "elastic_tangential": SERIES["elastic_tangential"],
+    "friction": SERIES["friction"],
+    "dashpot_normal": SERIES["dashpot_normal"],
+    "dashpot_tangential": SERIES["dashpot_tangential"],
+    "damping": SERIES["damping"],
+    "escaped_energy": SERIES["escaped_energy"],
+    "time_step_energy": SERIES["time_step_energy"],
+    "work": SERIES["work"],
+    "residual": SERIES["residual"],
+    "energy_in": SERIES["energy_in"],
+    "unbalanced": SERIES["unbalanced"],
+    "stage_start": ("1", "1 where a stage begins"),
+    "stage_end": ("1", "1 where a stage ends"),
+}
+
+
+class Column(NamedTuple):
+    """One array of /VTKHDF/PointData or CellData: shape (rows,) or (rows, width)."""
+
+    unit: str
+    definition: str
+    dtype: str
+    width: int = 1
+    stored: tuple[int, ...] = ()  # of `width` columns, those that are ever other than zero
+    static: bool = False  # written once and shared by all frames
+    fill: int = 0  # value on helper points (and, for cells, on the grains' vertices)
+
+
+# Points of a frame: first the grains, then two ends a wall, then one foot point a contact with a wall.
+POINT_DATA: dict[str, Column] = {
+    "id": Column("1", "number of the grain, -1 on helper points", "i4", static=True, fill=-1),
+    "radius": Column("m", "radius", "f8", static=True),
+    "mass": Column("kg", "mass of the cylinder of the scenario's depth", "f8", static=True),
+    "inertia": Column("kg m^2", "moment of inertia about the centre", "f8", static=True),
+    "shape": Column("m", "tensor whose principal values are the diameters", "f8", 9, (0, 4), static=True),
+    "angle": Column("rad", "rotation since the start, anticlockwise", "f8"),
+    "velocity": Column("m/s", "velocity in the container's frame", "f8", 3, (0, 1)),
+    "spin": Column("rad/s", "angular velocity, anticlockwise", "f8"),
+    "coordination": Column("1", "number of contacts", "i2"),
+    "stress": Column("Pa", "mean stress tensor of the grain, compression > 0", "f4", 9, (0, 1, 3, 4)),
+    "escaped": Column("1", "1 once the grain has left the container", "u1"),
+}
+
+# Cells of a frame: first one vertex a grain, then one line a contact, then one line a wall.
+CELL_DATA: dict[str, Column] = {
+    "kind": Column("1", "0 grain, 1 contact of two grains, 2 contact with a wall, 3 wall, 4 nothing", "u1"),
+    "wall": Column("1", "number of the wall, -1 if none", "i2", fill=-1),
+    "sliding": Column("1", "1 where the friction limit is reached", "u1"),
+    "normal_force": Column("N", "normal force, compression > 0", "f8"),
+    "shear_force": Column("N", "force on the second body along (-ny, nx)", "f8"),
+    "overlap": Column("m", "overlap", "f8"),
+    "stretch": Column("m", "elastic tangential stretch", "f8"),
+    "normal": Column("1", "unit normal from the first body to the second", "f8", 3, (0, 1)),
+    "contact_point": Column("m", "contact point", "f8", 3, (0, 1)),
+}
+KIND_GRAIN, KIND_CONTACT, KIND_WALL_CONTACT, KIND_WALL, KIND_NOTHING = range(5)

@@ -1,0 +1,91 @@
+"""Reads a scenario: TOML text -> data -> overrides -> model, with all mistakes of the user in one error."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from dem_cli.errors import ScenarioError
+from dem_cli.scenario import mistakes
+from dem_cli.scenario.grain_file import SCALE, read_grain_file
+from dem_cli.scenario.model import Scenario, tracked_exist
+from dem_cli.scenario.overrides import apply_overrides
+
+
+def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+    """The scenario of a TOML file, changed by `overrides` ("contact.friction=0.3"). ScenarioError holds a line per mistake."""
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise ScenarioError(f"{path}: does not exist. List the scenarios that come along with: dem init") from None
+    except IsADirectoryError:
+        raise ScenarioError(f"{path}: is a folder. Name a scenario file in it") from None
+    except UnicodeDecodeError:
+        raise ScenarioError(f"{path}: is not text in UTF-8. Save it in this encoding") from None
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions") from None
+    scenario = parse_scenario(text, origin=str(path), folder=path.parent, overrides=overrides)
+    scenario._path = path
+    return scenario
+
+
+def parse_scenario(
+    text: str, origin: str = "<text>", folder: str | Path = ".", overrides: Iterable[str] = ()
+) -> Scenario:
+    """The scenario that `text` holds. origin: its name in messages. folder: where paths in it start."""
+    try:
+        raw = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(mistakes.syntax(origin, text, error)) from None
+    folder = Path(folder)
+    lines = apply_overrides(raw, overrides)
+    scenario: Scenario | None = None
+    found: list[tuple[tuple[str | int, ...], Any, str, str]] = []
+    try:
+        scenario = Scenario.model_validate(raw)
+    except ValidationError as error:
+        for one in error.errors(include_url=False):
+            ctx = one["ctx"]
+            found.append((one["loc"], one["input"], ctx["rule"], ctx["remedy"]))
+    from_file = [] if any(one[0] == ("packing", "file") for one in found) else _packing_file(raw, folder, scenario)
+    order = list(raw)
+    found.sort(key=lambda one: order.index(str(one[0][0])) if one[0][0] in order else len(order))
+    lines += [mistakes.line(origin, *one, raw) for one in found]
+    lines += [mistakes.line(origin, *one, raw) for one in from_file]
+    if lines or scenario is None:
+        raise ScenarioError("\n".join(dict.fromkeys(lines)))
+    scenario._source = text
+    scenario._folder = folder
+    return scenario
+
+
+def _packing_file(
+    raw: dict[str, Any], folder: Path, scenario: Scenario | None
+) -> list[tuple[tuple[str | int, ...], Any, str, str]]:
+    """Mistakes of the file of grains, and of keys that disagree with it."""
+    packing = raw.get("packing")
+    name = packing.get("file") if isinstance(packing, dict) else None
+    if not isinstance(name, str):
+        return []
+    unit = packing.get("file_unit", "m") if isinstance(packing, dict) else "m"
+    try:
+        grains = read_grain_file(folder / name, unit if unit in SCALE else "m")
+    except ScenarioError as error:
+        rule, _, remedy = str(error).removeprefix(f"{folder / name}: ").rpartition(". ")
+        return [(("packing", "file"), name, rule, remedy)]
+    if scenario is None:
+        return []
+    found: list[tuple[tuple[str | int, ...], Any, str, str]] = []
+    count = scenario.grains.count
+    if count is not None and count != len(grains.x):
+        rule = f"differs from the {len(grains.x)} grains of {name}"
+        found.append((("grains", "count"), count, rule, "Leave count out: the file gives it"))
+    if scenario.output.tracks:
+        ids = list(scenario.output.tracks.grains)
+        found += [(m.loc, ids, m.rule, m.remedy) for m in tracked_exist(scenario.output, len(grains.x))]
+    return found

@@ -1,0 +1,125 @@
+"""Changes to a scenario from the command line: `--set contact.friction=0.3`, `--set "stage.2.amplitude=800 gal"`."""
+
+from __future__ import annotations
+
+import tomllib
+import types
+import typing
+from collections.abc import Iterable
+from typing import Any
+
+from dem_cli.scenario.model import Scenario
+from dem_cli.scenario.stages import STAGES
+from dem_cli.scenario.table import Table, keys_of, nearest
+
+
+class _RefusedError(Exception):
+    """Why an override cannot be applied: rule and remedy."""
+
+    def __init__(self, rule: str, remedy: str) -> None:
+        super().__init__(rule)
+        self.rule = rule
+        self.remedy = remedy
+
+
+def apply_overrides(raw: dict[str, Any], overrides: Iterable[str]) -> list[str]:
+    """Changes the TOML data `raw` in place, one KEY=VALUE after the other; the mistakes as lines.
+
+    VALUE is read as TOML where that works (0.3, true, [1, 2]) and is text elsewhere (400 gal). Stages are counted from 1
+    (stage.2.amplitude), or named by kind or name (stage.shake.amplitude); the number may be left out where only one stage knows
+    the key. A key displaces those that exclude it: cycles takes the place of duration.
+    """
+    said = []
+    for override in overrides:
+        try:
+            _apply(raw, override)
+        except _RefusedError as refused:
+            said.append(f"--set {override}: {refused.rule}. {refused.remedy}")
+    return said
+
+
+def _apply(raw: dict[str, Any], override: str) -> None:
+    path, sign, text = override.partition("=")
+    parts = [p.strip() for p in path.split(".")]
+    if not sign or not all(parts):
+        raise _RefusedError("is not KEY=VALUE", "Write for example --set contact.friction=0.3")
+    value = _value(text.strip())
+    if parts[0] == "stage" and len(parts) > 1:
+        for stage in _stages(raw, parts):
+            rest = parts[2:] if _is_selector(raw, parts[1]) else parts[1:]
+            _set(STAGES[stage["kind"]], stage, rest, value, parts[: len(parts) - len(rest)])
+    else:
+        _set(Scenario, raw, parts, value, [])
+
+
+def _value(text: str) -> Any:
+    try:
+        data = tomllib.loads(f"value = {text}")
+    except tomllib.TOMLDecodeError:
+        return text
+    return data["value"] if len(data) == 1 else text
+
+
+def _set(table: type[Table], raw: dict[str, Any], parts: list[str], value: Any, before: list[str]) -> None:
+    """Sets parts[0].parts[1]... of the table `raw`, whose path is `before`."""
+    name, rest = parts[0], parts[1:]
+    known = keys_of(table)
+    if name not in known:
+        near = nearest(name, known)
+        full = ".".join([*before, near, *rest]) if near else ""
+        advice = f'Did you mean "{full}"?' if near else f"Known here: {', '.join(known)}"
+        raise _RefusedError("unknown key", advice)
+    if not rest:
+        raw[name] = value
+    else:
+        inner = _table_of(table, name)
+        if inner is None:
+            raise _RefusedError(f"{'.'.join([*before, name])} is a value, not a table", f"Leave out .{'.'.join(rest)}")
+        content = inner.spell_out(raw[name]) if name in raw else {}
+        content = dict(content) if isinstance(content, dict) else {}
+        _set(inner, content, rest, value, [*before, name])
+        raw[name] = content
+    for group in table.alternatives:
+        if any(name in option for option in group):
+            for rival in (k for option in group if name not in option for k in option):
+                raw.pop(rival, None)
+
+
+def _table_of(table: type[Table], name: str) -> type[Table] | None:
+    """The table that key `name` holds, None for a plain value."""
+    field = next(f for attribute, f in table.model_fields.items() if (f.alias or attribute) == name)
+    kinds = typing.get_args(field.annotation) if isinstance(field.annotation, types.UnionType) else (field.annotation,)
+    return next((k for k in kinds if isinstance(k, type) and issubclass(k, Table)), None)
+
+
+def _usable_stages(raw: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
+    stages = raw.get("stage")
+    listed = stages if isinstance(stages, list) else []
+    return [(k, s) for k, s in enumerate(listed, 1) if isinstance(s, dict) and s.get("kind") in STAGES]
+
+
+def _is_selector(raw: dict[str, Any], word: str) -> bool:
+    return word.isdigit() or any(word in (s["kind"], s.get("name")) for _, s in _usable_stages(raw))
+
+
+def _stages(raw: dict[str, Any], parts: list[str]) -> list[dict[str, Any]]:
+    """The stages that stage.WHICH.KEY or stage.KEY means."""
+    stages = _usable_stages(raw)
+    which = parts[1]
+    if _is_selector(raw, which):
+        chosen = [s for k, s in stages if which in (str(k), s["kind"], s.get("name"))]
+        if not chosen:
+            raise _RefusedError(f"there is no stage {which}", f"The scenario has {len(stages)} stages, counted from 1")
+        if len(parts) < 3:
+            raise _RefusedError("names a stage, but no key of it", f"Write for example --set stage.{which}.name=first")
+        return chosen
+    knowing = [(k, s) for k, s in stages if which in keys_of(STAGES[s["kind"]])]
+    if not knowing:
+        known = sorted({k for _, s in stages for k in keys_of(STAGES[s["kind"]])})
+        near = nearest(which, known)
+        advice = f'Did you mean "stage.{".".join([near, *parts[2:]])}"?' if near else f"Known here: {', '.join(known)}"
+        raise _RefusedError("unknown key", advice)
+    if len(knowing) > 1:
+        options = " or ".join(f"stage.{k}.{'.'.join(parts[1:])}" for k, _ in knowing)
+        raise _RefusedError("may mean several stages", f"Write {options}")
+    return [knowing[0][1]]

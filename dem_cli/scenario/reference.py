@@ -1,0 +1,150 @@
+"""The model as a manual: JSON Schema for editors, tables of keys for the README."""
+
+from __future__ import annotations
+
+import types
+import typing
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from dem_cli import units
+from dem_cli.scenario.model import Scenario
+from dem_cli.scenario.quantities import Number, Quantity, Range, Whole
+from dem_cli.scenario.stages import STAGES
+from dem_cli.scenario.table import Table, toml_text
+
+HEAD = "| key | value | default | meaning |\n|---|---|---|---|\n"
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema (draft 2020-12) of scenario files."""
+    schema = Scenario.model_json_schema(by_alias=True, mode="validation")
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "dem-cli scenario",
+        "description": "A scenario of dem-cli. Values with a dimension are strings with their unit.",
+    }
+    return head | {k: v for k, v in _tidy(schema).items() if k not in head}
+
+
+def _tidy(node: Any) -> Any:
+    """Without what pydantic adds for Python: titles made from names, and null as an alternative to leaving a key out."""
+    if isinstance(node, list):
+        return [_tidy(one) for one in node]
+    if not isinstance(node, dict):
+        return node
+    clean = {
+        k: _tidy(v)
+        for k, v in node.items()
+        if not (k == "title" and isinstance(v, str)) and (k, v) != ("default", None)
+    }
+    options = clean.get("anyOf")
+    if isinstance(options, list) and {"type": "null"} in options:
+        rest = [one for one in options if one != {"type": "null"}]
+        del clean["anyOf"]
+        clean = {**(rest[0] if len(rest) == 1 else {"anyOf": rest}), **clean}
+    if "description" in clean and "$comment" in clean:  # unit and range, where editors show them
+        clean["description"] += f" [{clean.pop('$comment')}]"
+    return clean
+
+
+def reference_markdown() -> str:
+    """The reference of scenario files: a Markdown table of keys for each table of the TOML."""
+    sections = [_section("Top level", Scenario, "")]
+    for name, field in Scenario.model_fields.items():
+        if name == "stages":
+            for kind, stage in STAGES.items():
+                sections.append(_section(f'`[[stage]]` with `kind = "{kind}"`', stage, f"stage.{kind}"))
+        elif (table := _table(field)) is not None:
+            sections.append(_section(f"`[{name}]`", table, name))
+    return "\n".join(sections)
+
+
+def _section(title: str, table: type[Table], path: str) -> str:
+    about = "" if table is Scenario else f"{' '.join((table.__doc__ or '').split())}\n\n"
+    rows = "".join(f"| `{k}` | {v} | {d} | {m} |\n" for k, v, d, m in _rows(table, "", path == ""))
+    return f"### {title}\n\n{about}{HEAD}{rows}"
+
+
+def _rows(table: type[Table], before: str, top: bool = False) -> Iterator[tuple[str, str, str, str]]:
+    """key, value, default, meaning of each key, with the keys of inner tables after their own."""
+    for name, field in table.model_fields.items():
+        key = f"{before}{field.alias or name}"
+        inner = _table(field)
+        if top and (inner is not None or name == "stages"):
+            continue
+        if key == "kind":
+            continue
+        yield key, _value(field, inner), _default(field), _cell(field.description or "")
+        if inner is not None:
+            yield from _rows(inner, f"{key}.")
+
+
+def _table(field: FieldInfo) -> type[Table] | None:
+    for kind in (field.annotation, *typing.get_args(field.annotation)):
+        if isinstance(kind, type) and issubclass(kind, Table):
+            return kind
+    return None
+
+
+def _value(field: FieldInfo, inner: type[Table] | None) -> str:
+    """What may stand there: a quantity, a range of numbers, words, text."""
+    example = f", e.g. `{toml_text(field.examples[0])}`" if field.examples else ""
+    words = [
+        w
+        for kind in _parts(field.annotation)
+        for w in typing.get_args(kind)
+        if typing.get_origin(kind) is typing.Literal
+    ]
+    bounds = next(_bounds(field), None)
+    if inner is not None:
+        said = "table" if inner.short_form is None else f"{_short(inner)} or table"
+    elif isinstance(bounds, Quantity):
+        said = " ".join([units.dimension(bounds.unit), bounds.words(bounds.unit)]).strip()
+        said = " or ".join([*(f'`"{w}"`' for w in bounds.words_allowed), said])
+    elif isinstance(bounds, Number):
+        said = " ".join(["whole number" if isinstance(bounds, Whole) else "number", bounds.words()]).strip()
+    elif words:
+        return " or ".join(f'`"{w}"`' for w in words)
+    else:
+        said = "`true` or `false`" if field.annotation is bool else "text"
+        example = "" if said != "text" else example
+    many = typing.get_origin(next(iter(_parts(field.annotation)))) is tuple
+    return _cell((f"list of: {said}" if many else said) + example)
+
+
+def _short(table: type[Table]) -> str:
+    return "length" if (table.short_form or {}).get("type") == "string" else "number"
+
+
+def _parts(kind: Any) -> list[Any]:
+    """The alternatives of a union, without None."""
+    if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
+        return [one for one in typing.get_args(kind) if one is not type(None)]
+    return [kind]
+
+
+def _bounds(field: FieldInfo) -> Iterator[Range]:
+    """Units and ranges anywhere in the type of a field."""
+
+    def walk(kind: Any) -> Iterator[Range]:
+        yield from (extra for extra in getattr(kind, "__metadata__", ()) if isinstance(extra, Range))
+        for inner in typing.get_args(kind):
+            yield from walk(inner)
+
+    yield from (extra for extra in field.metadata if isinstance(extra, Range))
+    yield from walk(field.annotation)
+
+
+def _default(field: FieldInfo) -> str:
+    if field.is_required():
+        return "required"
+    if field.default_factory is not None or field.default is None or field.default == {}:
+        return ""
+    return f"`{toml_text(field.default)}`"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")

@@ -1,0 +1,121 @@
+"""The model as a manual: every key says what it means, and the tables and the schema are complete."""
+
+from __future__ import annotations
+
+import tomllib
+from typing import Any
+
+import jsonschema
+import pytest
+from scenario_text import ABSENT, small
+
+from dem_cli.scenario import Scenario, parse_scenario
+from dem_cli.scenario.reference import json_schema, reference_markdown
+from dem_cli.scenario.stages import STAGES
+from dem_cli.scenario.table import Table, _good_values
+
+
+def all_tables(start: type[Table]) -> set[type[Table]]:
+    """Every table class that the scenario can hold."""
+    found: set[type[Table]] = set()
+
+    def walk(kind: Any) -> None:
+        if isinstance(kind, type) and issubclass(kind, Table) and kind not in found:
+            found.add(kind)
+            for field in kind.model_fields.values():
+                walk(field.annotation)
+        for inner in getattr(kind, "__args__", ()):
+            walk(inner)
+
+    walk(start)
+    return found
+
+
+TABLES = sorted(all_tables(Scenario), key=lambda table: table.__name__)
+
+
+def test_all_tables_are_found() -> None:
+    assert {"Scenario", "Radius", "Grading", "ExtraDamping", "Shake", "Window"} <= {t.__name__ for t in TABLES}
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.__name__)
+def test_every_key_is_described(table: type[Table]) -> None:
+    assert table.__doc__
+    for name, field in table.model_fields.items():
+        assert field.description, name
+        if table is not Scenario:
+            assert field.examples, name
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.__name__)
+def test_examples_are_valid(table: type[Table]) -> None:
+    """What messages suggest to write must be right."""
+    for name, field in table.model_fields.items():
+        if field.examples:
+            assert name in _good_values(table, {field.alias or name: field.examples[0], "friction": 0.1}), name
+
+
+def test_reference_names_every_key() -> None:
+    text = reference_markdown()
+    for table in TABLES:
+        if table is Scenario:
+            continue
+        for name, field in table.model_fields.items():
+            key = field.alias or name
+            assert f"{key}` |" in text or key == "kind", (table.__name__, key)
+    for kind in STAGES:
+        assert f'kind = "{kind}"' in text
+    assert '| `density` | density above 0 kg/m^3, e.g. `"2480 kg/m^3"` | required | density of the solid |' in text
+    rows = [line for line in text.splitlines() if line.startswith("|")]
+    assert all(row.count("|") - row.count("\\|") == 5 for row in rows)
+
+
+SCHEMA = json_schema()
+
+
+def valid(text: str) -> bool:
+    return bool(jsonschema.Draft202012Validator(SCHEMA).is_valid(tomllib.loads(text)))
+
+
+def test_schema_is_a_schema() -> None:
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+
+
+def test_schema_takes_what_the_model_takes() -> None:
+    assert valid(small())
+    assert valid(parse_scenario(small()).resolved_toml())
+    assert valid(
+        small({"grains.radius": "7 mm", "contact.wall_friction": {"bottom": 0.1}, "integration.time_step": "auto"})
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"contact.frction": 0.5},
+        {"contact.friction": "0.5"},
+        {"contact.friction": ABSENT},
+        {"contact.restitution": 0.5},
+        {"contact.tension": "some"},
+        {"container.width": 121.5},
+        {"container.width": "121.5"},
+        {"container.width": "wide"},
+        {"material.poisson_ratio": 0.5},
+        {"grains.count": 0},
+        {"stage.1.amplitude": ABSENT},
+        {"stage.1.cycles": 5},
+        {"stage.0.kind": "wait"},
+        {"integration.time_step": "autom"},
+        {"title": 1},
+    ],
+    ids=str,
+)
+def test_schema_refuses_what_the_model_refuses(changes: dict[str, Any]) -> None:
+    assert not valid(small(changes))
+
+
+def test_schema_shows_units_ranges_and_defaults_to_editors() -> None:
+    properties = SCHEMA["$defs"]["Container"]["properties"]
+    assert "inner width [length with its unit, above 0 m]" in properties["width"]["description"]
+    assert properties["gravity"]["default"] == "9.80665 m/s^2"
+    assert "null" not in str(SCHEMA)
