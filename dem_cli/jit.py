@@ -28,8 +28,8 @@ def _cache_folder() -> Path:
     return root / "dem-cli" / f"numba-{digest.hexdigest()[:16]}"
 
 
-if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(_cache_folder())
+CACHE_FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or _cache_folder())
+numba.config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
 
 
 def kernel(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
@@ -43,4 +43,4 @@ def kernel(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
 
 def is_cold() -> bool:
     """Whether the cache holds no machine code of the present sources yet: the first run will compile."""
-    return not any(Path(numba.config.CACHE_DIR).rglob("*.nbi"))
+    return not any(CACHE_FOLDER.rglob("*.nbi"))

@@ -48,9 +48,9 @@ def grid(columns: int, rows: int) -> tuple[Grains, Walls, Contacts, float]:
     walls = Walls(
         ("left", "bottom", "right"),
         np.array([0.0, 0.0, width]),
-        np.array([10.0 * width, 0.0, 0.0]),
+        np.array([np.inf, 0.0, 0.0]),
         np.array([0.0, width, width]),
-        np.array([0.0, 0.0, 10.0 * width]),
+        np.array([0.0, 0.0, np.inf]),
         np.array([0.25, 0.25, 0.25]),
     )
     right = k[column < columns - 1]
@@ -147,7 +147,7 @@ def make_file(
             row = series_row(float(time), 1000 * step, stage, residual)
             if time == 0.0:
                 writer.begin_stage("settle", "settle", 0.0, row)
-            eta = row["depth"] + row["mode1"] * np.cos(np.pi * places / width)
+            eta = row["depth"] + row["mode1"] * np.cos(np.pi * places / width) + 0.003 * np.sin(5.0 * places / width)
             eta[0] = np.nan
             writer.append_series(row, eta)
             if time == SETTLED:
@@ -182,7 +182,7 @@ def _moved(grains: Grains, time: float) -> Grains:
         grains,
         x=grains.x + size * np.sin(phase) + 0.3 * size * t,
         y=grains.y * (1.0 + lift) + size * (np.cos(phase) - 1.0) - 0.01 * t * grains.y,
-        angle=0.2 * t * np.cos(grains.id * 1.0),
+        angle=0.2 * t * np.cos(grains.id * 1.0) + 0.05 * grains.id,
         vx=size * 2.0 * np.pi / SLOSH * np.cos(phase),
         vy=np.full(len(grains), -0.6 * max(SETTLED - time, 0.0)),
         spin=0.2 * np.cos(grains.id * 1.0),

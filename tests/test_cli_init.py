@@ -27,7 +27,7 @@ def test_list() -> None:
     result = CliRunner().invoke(main, ["init"])
     assert result.exit_code == 0
     for one in shipped_scenarios():
-        for text in (one.name, one.title, one.shows, one.takes):
+        for text in (one.name, one.title, one.shows[1:], one.takes):
             assert text in result.stdout
 
 

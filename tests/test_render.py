@@ -186,6 +186,18 @@ def test_escaped_grains_are_not_drawn(results: Results, monkeypatch: pytest.Monk
     assert figure.axes[0].get_xlim()[1] < 50.0
 
 
+def test_walls_without_end_leave_the_picture(results: Results) -> None:
+    ax = drawn(results).axes[0]
+    left, floor, right = (line.get_xydata() for line in ax.lines)
+    width = results.width / 0.01
+    np.testing.assert_allclose(np.sort(floor[:, 0]), [0.0, width])
+    np.testing.assert_allclose(floor[:, 1], 0.0)
+    for wall, place in ((left, 0.0), (right, width)):
+        np.testing.assert_allclose(wall[:, 0], place)
+        assert wall[:, 1].min() == 0.0
+        assert ax.get_ylim()[1] < wall[:, 1].max() < np.inf
+
+
 def test_chains_join_the_centres_as_wide_as_the_force(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     frame = results.frame(-1)
     c = frame.contacts
@@ -197,6 +209,10 @@ def test_chains_join_the_centres_as_wide_as_the_force(results: Results, monkeypa
     kept = np.flatnonzero(c.normal > 0.02 * widest)
     paths, widths = lines.get_paths(), np.asarray(lines.get_linewidths())
     assert len(paths) == len(kept)
+    figure.draw_without_rendering()
+    across = figure.axes[0].transData.transform([(0.0, 0.0), (1.0, 0.0)])[:, 0]
+    mean_radius = frame.grains.radius.mean() / 0.01 * (across[1] - across[0]) * 72.0 / figure.dpi
+    assert widths.max() == pytest.approx(min(mean_radius, 5.0), rel=0.1)
     order = kept[np.argsort(c.normal[kept], kind="stable")]
     np.testing.assert_allclose(widths / widths.max(), np.minimum(c.normal[order] / widest, 1.0), rtol=1e-9)
     for k, contact in enumerate(order):
@@ -248,16 +264,18 @@ def test_one_value_for_all_grains(
         return np.full(len(frame.grains), value)
 
     monkeypatch.setitem(QUANTITIES, color, replace(QUANTITIES[color], values=same))
+    (discs,) = collections(drawn(results, color=color), EllipseCollection)
+    assert discs.norm.vmax > discs.norm.vmin
     assert pixels(results, tmp_path, color=color).std() > 0.02
 
 
 def test_title_tells_time_and_stage(results: Results, tmp_path: Path) -> None:
     figure = drawn(results, frame=1)
     assert "t = 1 s, stage 2 (shake)" in figure.get_suptitle()
-    cut = made.make_file(tmp_path / "cut.h5", stop_after=3.0, interval=0.1, title="50 $ and 100 $ _^ 二次元")
+    cut = made.make_file(tmp_path / "cut.h5", stop_after=3.0, interval=0.1, title="50 $_^ and 100 $ 二次元")
     with open_results(cut) as other:
         title = drawn(other).get_suptitle()
-        assert title.startswith("50 $ and 100 $")
+        assert title.startswith("50 $_^ and 100 $")
         assert title.endswith("incomplete run")
         assert pixels(other, tmp_path).std() > 0.02
 
@@ -310,9 +328,11 @@ def test_too_many_tracks_are_said(tmp_path: Path) -> None:
 
 
 def test_series_are_those_of_the_file(results: Results) -> None:
-    figure = drawn(results, what="series", series=("void_ratio", "kinetic"))
-    for ax, name in zip(figure.axes, ("void_ratio", "kinetic"), strict=True):
-        np.testing.assert_allclose(ax.lines[0].get_ydata(), results.series[name])
+    names = {"void_ratio": 1.0, "kinetic": 1.0, "mode1": 0.001}
+    figure = drawn(results, what="series", series=tuple(names))
+    for ax, (name, factor) in zip(figure.axes, names.items(), strict=True):
+        np.testing.assert_allclose(ax.lines[0].get_ydata() * factor, results.series[name])
+    assert figure.axes[2].get_ylabel() == "mode1 [mm]"
     assert figure.axes[1].get_ylabel() == "kinetic [J]"
     figure = drawn(results, what="series", series=("void_ratio",), stage=1)
     assert figure.axes[0].lines[0].get_xdata()[-1] == made.SETTLED
@@ -336,11 +356,11 @@ def test_energy_stack_reaches_what_was_put_in(results: Results, stage: int | Non
     assert at_end == pytest.approx(line.get_ydata()[-1], rel=1e-9)
 
 
-def test_surface_is_height_above_its_start(results: Results) -> None:
+def test_surface_is_its_rise_since_the_start(results: Results) -> None:
     figure = drawn(results, what="surface")
     mesh = figure.axes[0].collections[0]
     inside = results.surface.time >= made.SETTLED
-    rise = results.surface.eta[inside] - made.DEPTHS[1]
+    rise = results.surface.eta[inside] - results.surface.eta[inside][0]
     shown = np.ma.asarray(mesh.get_array())
     assert shown[0].mask.all()  # the bin that is NaN in the file
     np.testing.assert_allclose(shown[1:] * 0.01, rise.T[1:], atol=1e-12)
@@ -426,6 +446,7 @@ def test_what_the_file_lacks_is_said(tmp_path: Path) -> None:
         ("m", 2.0, (1.0, "m")),
         ("m", 0.2, (0.01, "cm")),
         ("m", 0.004, (0.001, "mm")),
+        ("m", 0.0009, (0.001, "mm")),
         ("m", 1e-9, (1e-6, "µm")),
         ("Pa", 2500.0, (1e3, "kPa")),
         ("m/s^2", 4.0, (1.0, "m/s^2")),

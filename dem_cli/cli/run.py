@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from pathlib import Path
 
@@ -54,8 +55,11 @@ def command(
             raise
         progress.say(f"done in {clock(time.monotonic() - began)}: {target}")
     if report:
-        from dem_cli.cli.report import print_report
+        from dem_cli.report.summary import summary
+        from dem_cli.report.text import blocks, show
+        from dem_cli.results import open_results
 
-        print_report(target)
+        with open_results(target) as results:
+            show(blocks(summary(results)), sys.stdout)
     elif settings.verbosity >= 0:
         click.echo(f"dem report {target} says what came out", err=True)

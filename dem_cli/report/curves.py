@@ -106,7 +106,7 @@ def draw_energy(results: Results, window: Window, text: str) -> Figure:
 
 
 def draw_surface(results: Results, window: Window, text: str, limits: tuple[float, float] | None = None) -> Figure:
-    """Free surface over place and time, above its mean at the start of the window, and the antisymmetric mode
+    """Rise of the free surface over place and time since the start of the window, and the antisymmetric mode
     below.
     """
     surface = results.surface
@@ -114,7 +114,8 @@ def draw_surface(results: Results, window: Window, text: str, limits: tuple[floa
     time, eta = np.asarray(surface.time)[inside], np.asarray(surface.eta, dtype=float)[inside]
     finite = np.isfinite(eta).any(axis=1)
     level = float(np.nanmean(eta[finite][0])) if finite.any() else 0.0
-    rise = np.ma.masked_invalid(eta - level)
+    start = np.where(np.isfinite(eta[0]), eta[0], level)
+    rise = np.ma.masked_invalid(eta - start)
     size = np.percentile(np.abs(rise.compressed()), 99.5) if rise.count() else 0.0
     factor, unit = display_unit("m", float(size) if limits is None else largest(np.array(limits)))
     low, high = (-size, size) if limits is None else limits
@@ -136,7 +137,7 @@ def draw_surface(results: Results, window: Window, text: str, limits: tuple[floa
     upper.set_facecolor("0.8")
     upper.set_ylabel(axis_label("x", place_unit))
     bar = figure.colorbar(image, ax=upper, aspect=20, pad=0.02, extend=extend)
-    bar.set_label(axis_label("height above the first mean", unit))
+    bar.set_label(axis_label("rise since the start", unit))
     series_time = np.asarray(results.series["time"])
     mode = np.asarray(results.series["mode1"], dtype=float)
     chosen = _inside(series_time, window)

@@ -47,30 +47,27 @@ _RC: dict[str, Any] = {
 # Fonts with Japanese glyphs, for titles; the first that is installed is used beside the default.
 _CJK_FONTS = ("Noto Sans CJK JP", "IPAexGothic", "IPAGothic", "Hiragino Sans", "Yu Gothic", "MS Gothic")
 
-# Unit -> larger and smaller units to show it in, as (factor to divide by, name).
-_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
-    "m": ((1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm")),
-    "m/s": ((1.0, "m/s"), (1e-3, "mm/s"), (1e-6, "µm/s")),
-    "Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa")),
-    "N": ((1e6, "MN"), (1e3, "kN"), (1.0, "N"), (1e-3, "mN")),
-    "J": ((1e6, "MJ"), (1e3, "kJ"), (1.0, "J"), (1e-3, "mJ"), (1e-6, "µJ")),
-    "s": ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")),
-    "rad": ((np.pi / 180.0, "deg"),),
-    "1": ((1.0, ""),),
+# SI unit -> units to show it in, from the largest: (SI value of the unit, name, least magnitude it is used for).
+_UNITS: dict[str, tuple[tuple[float, str, float], ...]] = {
+    "m": ((1.0, "m", 0.95), (1e-2, "cm", 0.95e-2), (1e-3, "mm", 1e-4), (1e-6, "µm", 0.0)),
+    "m/s": ((1.0, "m/s", 0.1), (1e-3, "mm/s", 1e-4), (1e-6, "µm/s", 0.0)),
+    "Pa": ((1e9, "GPa", 1e9), (1e6, "MPa", 1e6), (1e3, "kPa", 1e3), (1.0, "Pa", 0.0)),
+    "N": ((1e6, "MN", 1e6), (1e3, "kN", 1e3), (1.0, "N", 0.1), (1e-3, "mN", 0.0)),
+    "J": ((1e6, "MJ", 1e7), (1e3, "kJ", 1e4), (1.0, "J", 0.1), (1e-3, "mJ", 1e-4), (1e-6, "µJ", 0.0)),
+    "s": ((1.0, "s", 0.1), (1e-3, "ms", 1e-4), (1e-6, "µs", 0.0)),
+    "rad": ((np.pi / 180.0, "deg", 0.0),),
+    "1": ((1.0, "", 0.0),),
 }
 
 
 def display_unit(unit: str, largest: float) -> tuple[float, str]:
-    """Unit in which a quantity whose largest magnitude is `largest` (SI) reads well: (SI value of the unit,
-    name).
-    """
-    choices = _UNITS.get(unit, ((1.0, unit),))
-    if np.isfinite(largest) and largest > 0.0:
-        for factor, name in choices:
-            if largest >= 0.95 * factor:
-                return factor, name
-        return choices[-1]
-    return next((choice for choice in choices if choice[0] == 1.0), choices[0])
+    """Unit in which a quantity whose largest magnitude is `largest` (SI) reads well: (SI value of the unit, name)."""
+    choices = _UNITS.get(unit, ((1.0, unit, 0.0),))
+    known = np.isfinite(largest) and largest > 0.0
+    for factor, name, least in choices:
+        if largest >= least if known else factor == 1.0:
+            return factor, name
+    return choices[-1][:2]
 
 
 def axis_label(name: str, unit: str) -> str:

@@ -123,7 +123,7 @@ def draw_sample(
     if chains is None:
         chains = float(np.mean(frame.grains.radius)) * points >= SMALL_RADIUS
     caption = _draw_chains(ax, frame, factor, points) if chains else ""
-    _draw_walls(ax, frame, factor)
+    _draw_walls(ax, frame, box, factor)
     text = f"t = {frame.time:.6g} s"
     if 0 <= frame.stage < len(results.stages):
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
@@ -226,8 +226,6 @@ def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize
         low, high = 0.0, float(np.percentile(values, 99.5))
     else:
         low, high = lowest, highest
-    if not high > low:
-        high = low + (abs(low) or 1.0)
     extend = extension(values, low, high)
     cmap = DIVERGING if kind == "signed" else SEQUENTIAL
     if kind == "count":
@@ -293,7 +291,10 @@ def _draw_lines(ax: Axes, segments: Floats, width: Floats, colour: str) -> None:
     ax.add_collection(lines)
 
 
-def _draw_walls(ax: Axes, frame: StoredFrame, factor: float) -> None:
+def _draw_walls(ax: Axes, frame: StoredFrame, box: tuple[float, float, float, float], factor: float) -> None:
+    """Walls as lines; those without an end (their coordinate is infinite) end beyond the picture."""
     w = frame.walls
+    far = 10.0 * max(box[1] - box[0], box[3] - box[2])
+    x0, y0, x1, y1 = (np.clip(end, -far, far) / factor for end in (w.x0, w.y0, w.x1, w.y1))
     for k in range(len(w)):
-        ax.plot([w.x0[k] / factor, w.x1[k] / factor], [w.y0[k] / factor, w.y1[k] / factor], color="black", lw=1.5)
+        ax.plot([x0[k], x1[k]], [y0[k], y1[k]], color="black", lw=1.5)

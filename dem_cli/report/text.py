@@ -106,7 +106,7 @@ def _shaking(stage: StageSummary) -> str:
 
 def _head(run: Run) -> Block:
     height = f", {with_unit(run.height, 'm')} high" if math.isfinite(run.height) else ", walls without end"
-    pace = f", {number(run.steps_per_second, '.3g')} steps/s, {number(run.grain_steps_per_second, '.3g')} grain-steps/s"
+    pace = f", {number(run.steps_per_second, ',.0f')} steps/s, {number(run.grain_steps_per_second / 1e6, '.3g')} million grain-steps/s"
     rows = (
         ("file", run.file),
         ("program", f"dem-cli {run.version}, engine {run.engine}"),
@@ -117,7 +117,7 @@ def _head(run: Run) -> Block:
             "state",
             ("complete" if run.complete else "INCOMPLETE") + (f": {run.stop_reason}" if run.stop_reason else ""),
         ),
-        ("time", f"{run.simulated_time:.5g} s simulated in {run.steps:.0f} steps"),
+        ("time", f"{run.simulated_time:.5g} s simulated in {run.steps:,.0f} steps"),
         ("computing", NOTHING if math.isnan(run.wall_time) else with_unit(run.wall_time, "s", ".3g") + pace),
     )
     return Block(run.title or run.file, (), rows, left=2)
@@ -150,7 +150,9 @@ def _stage(stage: StageSummary) -> Block:
     rows = []
     for (label, name, form, factor, change), after in zip(shown, afters, strict=True):
         before = stage.before[name]
-        share = number(100.0 * stage.change[name] / before if before else math.nan, "+.1f", "%")
+        share = ""
+        if name in ("void_ratio", "void_ratio_inner", "porosity", "porosity_inner", "depth", "coordination"):
+            share = number(100.0 * stage.change[name] / before if before else math.nan, "+.1f", "%")
         pair = f"{number(before * factor, form)} -> {after.ljust(width)}"
         rows.append((label, pair, number(stage.change[name] * factor, change), share))
     rows.append(("most airborne in the stage", number(stage.airborne_largest, ".0f").ljust(width), "", ""))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -129,9 +130,9 @@ class Results:
     def stages(self) -> list[Stage]:
         group = self._file["stages"]
         names = list(group["quantity"].asstr()[:])
-        texts = {name: group[name].asstr()[:] for name in ("name", "kind", "reason")}
-        numbers = {name: group[name][:] for name in ("start", "end", "before", "after")}
-        count = min(len(values) for values in (*texts.values(), *numbers.values()))
+        count = int(group.attrs["rows"])
+        texts = {name: group[name].asstr()[:count] for name in ("name", "kind", "reason")}
+        numbers = {name: group[name][:count] for name in ("start", "end", "before", "after")}
 
         def measures(row: Floats) -> dict[str, float]:
             return {} if np.all(np.isnan(row)) else dict(zip(names, row.tolist(), strict=True))
@@ -261,13 +262,7 @@ def open_results(path: Path | str) -> Results:
         partial = partial_path(path) if path.name else path
         hint = f"; an unfinished run left {partial}" if partial.is_file() else ""
         raise ResultsError(f"{path}: no such file{hint}")
-    try:
-        file = h5py.File(path, "r", locking=False)
-    except PermissionError as error:
-        raise ResultsError(f"{path}: may not be read") from error
-    except OSError as error:
-        text = "is damaged" if h5py.is_hdf5(path) else "is not a result file of dem-cli (no HDF5 file at all)"
-        raise ResultsError(f"{path}: {text}") from error
+    file = _open(path)
     try:
         _check_format(path, file)
         return Results(path, file)
@@ -277,6 +272,21 @@ def open_results(path: Path | str) -> Results:
     except (KeyError, ValueError, OSError, RuntimeError) as error:
         file.close()
         raise ResultsError(f"{path}: is damaged: {error}") from error
+
+
+def _open(path: Path, tries: int = 4) -> Any:
+    """A running program may be in the middle of a flush, which takes some milliseconds: then try again."""
+    try:
+        return h5py.File(path, "r", locking=False)
+    except PermissionError as error:
+        raise ResultsError(f"{path}: may not be read") from error
+    except OSError as error:
+        if not h5py.is_hdf5(path):
+            raise ResultsError(f"{path}: is not a result file of dem-cli (no HDF5 file at all)") from error
+        if tries <= 1:
+            raise ResultsError(f"{path}: is damaged") from error
+    time.sleep(0.05)
+    return _open(path, tries - 1)
 
 
 def _check_format(path: Path, file: Any) -> None:

@@ -20,7 +20,10 @@ SERIES: dict[str, tuple[str, str]] = {
     "depth": ("m", "fill depth: mean height of the free surface"),
     "roughness": ("m", "standard deviation of the free surface about its straight line of best fit"),
     "mode1": ("m", "amplitude of the antisymmetric surface mode cos(pi x / l)"),
-    "coordination": ("1", "contacts per grain in the fill; a contact of two grains counts for both, one with a wall once"),
+    "coordination": (
+        "1",
+        "contacts per grain in the fill; a contact of two grains counts for both, one with a wall once",
+    ),
     "contacts": ("1", "number of contacts"),
     "sliding": ("1", "share of contacts at the friction limit"),
     "airborne": ("1", "grains above the fill that touch nothing joined to it"),

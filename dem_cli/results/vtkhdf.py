@@ -150,11 +150,15 @@ class FrameWriter:
         self._vertex_offsets = self._rows(root, "Vertices/Offsets", offset)
         self._line_offsets = self._rows(root, "Lines/Offsets", offset)
         for name in ("Polygons", "Strips"):
-            self._column(root, f"{name}/Connectivity", index)
+            self._column(root, f"{name}/Connectivity", index._replace(dtype="i8"))  # as its Offsets
 
     def _create_columns(self, name: str, columns: Mapping[str, Column]) -> dict[str, Rows]:
         group = self._root.create_group(name)
         return {column: self._rows(group, column, columns[column]) for column in columns}
+
+    def size(self, frame: Frame) -> int:
+        """Bytes that a frame takes, to within a few percent."""
+        return 71 * self._n + 90 * (0 if frame.contacts is None else len(frame.contacts))
 
     def append(self, frame: Frame, coordination: Ints, stress: Floats) -> int:
         """Hand one frame to HDF5. coordination (n,), stress (n, 4) [Pa]: xx, xy, yx, yy. Returns its bytes."""
@@ -183,7 +187,7 @@ class FrameWriter:
         self._cells += self._n + lines
         self._lines += lines
         self.steps += 1
-        return 67 * points + 88 * lines
+        return self.size(frame)
 
     def _write(
         self, datasets: Mapping[str, Rows], columns: Mapping[str, Column], start: int, rows: int, arrays: Arrays

@@ -74,43 +74,54 @@ class ResultWriter:
         self._started = self._flushed = clock.monotonic()
         self._bytes = 0
         self._stage = -1
+        self._last_time = np.nan
         self._stage_needs_row = False
         self._last_row: list[float] | None = None
         self._track_ids = None if tracks is None or len(tracks) == 0 else np.asarray(tracks, dtype=np.int64)
         self._file = _create(self._partial)
         self._open = True
-        with self._guard():
-            height = container.get("height")
-            attributes = {
-                "format": FORMAT,
-                "format_version": FORMAT_VERSION,
-                **provenance(),
-                "title": title,
-                "scenario": scenario_text,
-                "resolved": resolved_toml,
-                "scenario_hash": scenario_hash,
-                "seed": seed,
-                "engine": engine,
-                "grains": len(grains),
-                "depth": depth,
-                "width": container["width"],
-                "height": np.nan if height is None else height,
-                "started": datetime.now(UTC).isoformat(timespec="seconds"),
-                "wall_time": 0.0,
-                "stop_reason": "",
-                "complete": 0,
-            }
-            for name, value in attributes.items():
-                self._file.attrs[name] = value
-            self._series = Table(self._file.create_group("series"), SERIES)
-            self._create_surface(surface_x)
-            self._tracks = self._create_tracks()
-            self._stages = self._create_stages()
-            self._create_walls(walls)
-            self._warnings = self._file.create_dataset("warnings", (0,), TEXT, maxshape=(None,), chunks=(64,))
-            self._frames = FrameWriter(self._file, grains, walls)
-            self._parts = [self._series, self._surface, self._frames, *([self._tracks] if self._tracks else [])]
-            self.flush()
+        self._parts: list[Table | FrameWriter] = []
+        attributes = {
+            "title": title,
+            "scenario": scenario_text,
+            "resolved": resolved_toml,
+            "scenario_hash": scenario_hash,
+            "seed": seed,
+            "engine": engine,
+            "grains": len(grains),
+            "depth": depth,
+            "width": container["width"],
+            "height": np.nan if container.get("height") is None else container["height"],
+        }
+        try:
+            with self._guard():
+                self._create_groups(attributes, grains, walls, surface_x)
+                self.flush()
+        except RunError as error:
+            self._partial.unlink(missing_ok=True)
+            raise ResultsError(f"{self._partial}: cannot be written ({_cause(error.__cause__)})") from error
+
+    def _create_groups(self, attributes: Mapping[str, Any], grains: Grains, walls: Walls, surface_x: Floats) -> None:
+        root = {
+            "format": FORMAT,
+            "format_version": FORMAT_VERSION,
+            **provenance(),
+            **attributes,
+            "started": datetime.now(UTC).isoformat(timespec="seconds"),
+            "wall_time": 0.0,
+            "stop_reason": "",
+            "complete": 0,
+        }
+        for name, value in root.items():
+            self._file.attrs[name] = value
+        self._series = Table(self._file.create_group("series"), SERIES)
+        self._create_surface(surface_x)
+        self._tracks = self._create_tracks()
+        self._stages = self._create_stages()
+        self._create_walls(walls)
+        self._warnings = self._file.create_dataset("warnings", (0,), TEXT, maxshape=(None,), chunks=(64,))
+        self._frames = FrameWriter(self._file, grains, walls)
+        self._parts = [self._series, self._surface, self._frames, *([self._tracks] if self._tracks else [])]
 
     @property
     def file(self) -> Path:
@@ -131,7 +142,8 @@ class ResultWriter:
 
     def _create_stages(self) -> dict[str, Any]:
         """Columns over `stage`; the series row at its start and end as `before` and `after`, shape (stages, quantities)."""
-        group = self._file.create_group("stages")
+        group = self._stage_group = self._file.create_group("stages")
+        group.attrs["rows"] = 0
         names = [name for name in SERIES if name not in ("time", "step", "stage")]
         quantity = group.create_dataset("quantity", data=names, dtype=TEXT)
         quantity.make_scale("quantity")
@@ -170,7 +182,7 @@ class ResultWriter:
         values = [row[name] for name in self._series.names]
         time = float(row["time"])
         self._bytes += self._series.append(time, values)
-        self._bytes += self._surface.append(time, eta)
+        self._bytes += self._surface.append(time, [eta])
         self._keep_measures(row)
         with self._guard():
             self._flush_if_due()
@@ -178,6 +190,7 @@ class ResultWriter:
     def append_frame(self, frame: Frame, coordination: Ints, stress: Floats) -> None:
         """One step of /VTKHDF. coordination (n,); stress of each grain (n, 4) [Pa]: xx, xy, yx, yy."""
         with self._guard():
+            self._need_room(self._frames.size(frame))
             self._bytes += self._frames.append(frame, coordination, stress)
             self._flush_if_due()
 
@@ -190,9 +203,7 @@ class ResultWriter:
         with self._guard():
             self._flush_if_due()
 
-    def begin_stage(
-        self, name: str, kind: str, time: float, measures: Mapping[str, float] | None = None
-    ) -> None:
+    def begin_stage(self, name: str, kind: str, time: float, measures: Mapping[str, float] | None = None) -> None:
         """measures: the series row at this instant; if left out, the last row known if it is of this time, else the next one."""
         self._stage += 1
         with self._guard():
@@ -241,8 +252,7 @@ class ResultWriter:
     def flush(self) -> None:
         """Bring everything to the file now: first the data, then the counts of rows and frames that readers go by."""
         with self._guard():
-            if shutil.disk_usage(self._partial.parent).free < 2 * self._bytes + SPARE_BYTES:
-                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            self._need_room(2 * self._bytes)
             for part in self._parts:
                 part.flush()
             self._file.attrs.modify("wall_time", clock.monotonic() - self._started)
@@ -250,10 +260,16 @@ class ResultWriter:
             self._file.flush()
             for part in self._parts:
                 part.commit()
+            self._stage_group.attrs.modify("rows", self._stage + 1)
             self._file.flush()
-            _announce_length(self._file, 0)
+            _announce_length(self._file, SPARE_BYTES)
         self._bytes = 0
         self._flushed = clock.monotonic()
+
+    def _need_room(self, size: int) -> None:
+        """Fail before the disk is full: HDF5 fails in the middle of its work and cannot go back."""
+        if shutil.disk_usage(self._partial.parent).free < size + SPARE_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def finish(self, stop_reason: str, complete: bool = True) -> None:
         """Write the last attributes and close; a complete file takes its own name, another one keeps the partial one."""
@@ -265,6 +281,7 @@ class ResultWriter:
             self._file.attrs["stop_reason"] = stop_reason
             self._file.attrs.modify("complete", int(complete))
             self._file.flush()
+            _announce_length(self._file, 0)
             self._file.close()
             self._open = False
             if complete:
@@ -352,16 +369,19 @@ def _create(partial: Path) -> Any:
 def _announce_length(file: Any, extra: int) -> None:
     """Give the file its present length plus `extra` bytes (a hole, no room on disk) and say so in its head.
 
-    HDF5 writes the length last in a flush; a process killed before that would leave links that point beyond the end, and
-    nothing that opens. The number has 8 bytes at 40 in superblock 0 (HDF5 file format specification, II.A).
+    HDF5 writes the length last in a flush; a process killed before that, or a reader that opened the file before it, would meet
+    links that point beyond the end. The number has 8 bytes at 40 in superblock 0 (HDF5 file format specification, II.A).
     """
     length = file.id.get_filesize() + extra
     handle = file.id.get_vfd_handle()
-    os.ftruncate(handle, length)
+    if extra:
+        os.ftruncate(handle, length)
     os.pwrite(handle, length.to_bytes(8, "little"), 40)
+    if not extra:
+        os.ftruncate(handle, length)
 
 
-def _cause(error: Exception) -> str:
+def _cause(error: BaseException | None) -> str:
     """The operating system's words inside HDF5's message."""
     found = re.search(r"error message = '([^']+)'", str(error))
     if found:

@@ -27,9 +27,8 @@ class Normal(Table):
     @property
     def share(self) -> float:
         """Probability of the window from min to max."""
-        a, b = ((x - self.mean) / (self.sd * math.sqrt(2.0)) for x in (self.min, self.max))
-        # The tail's erfc keeps its digits where a difference of erf loses them.
-        return 0.5 * (math.erfc(a) - math.erfc(b)) if a > 0.0 else 0.5 * (math.erfc(-b) - math.erfc(-a))
+        low, high = (math.erf((x - self.mean) / (self.sd * math.sqrt(2.0))) for x in (self.min, self.max))
+        return 0.5 * (high - low)
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
@@ -39,7 +38,7 @@ class Normal(Table):
         if good["min"] >= good["max"]:
             yield Mistake(("min",), "must be smaller than max", f"Swap them, or raise max above {good['min']:g} m")
         elif {"mean", "sd"} <= good.keys() and (share := cls.model_construct(**good).share) < 0.01:
-            rule = f"leaves, up to max, only {max(share, 0.0):.1g} of the normal distribution; 0.01 is the least"
+            rule = f"leaves, up to max, only {share:.1g} of the normal distribution; 0.01 is the least"
             yield Mistake(("min",), rule, "Widen the window, or move mean into it")
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:

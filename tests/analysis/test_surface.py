@@ -84,6 +84,25 @@ def test_the_floor_joins_up_to_the_stated_gap(gap, joined):
     assert found.fill.tolist() == [True, joined]
 
 
+@pytest.mark.parametrize("turn", np.arange(8) * math.pi / 4)
+def test_near_grain_joins_the_largest_cluster_from_every_side(turn):
+    # three grains in the middle of a cell of the search grid (side 2.1, first cell about grain 4), one in the cell beside it
+    gap, middle = 0.1, 50.0 + 3.5 * 2.1
+    x = np.array([middle, middle + 0.01, middle - 0.01, middle + 2.05 * math.cos(turn), 50.0])
+    y = np.array([middle, middle, middle, middle + 2.05 * math.sin(turn), 50.0])
+    c = overlaps(x[:3], y[:3], np.ones(3))
+    joined = joined_to_bed(x, y, np.ones(5), np.ones(5, bool), c.i, c.j, gap)
+    assert joined.tolist() == [True] * 4 + [False]
+
+
+def test_grains_at_the_same_wall_are_not_joined_by_it():
+    x, y, radius = np.array([0.9, 0.9, 0.9]), np.array([1.0, 6.0, 11.0]), np.ones(3)
+    c = overlaps(x, y, radius, width=10.0)
+    assert c.j.tolist() == [-1, -1, -1]
+    found = surface.find_surface(x, y, radius, np.ones(3, bool), c, 10.0, 4)
+    assert found.airborne.tolist() == [False, True, True]
+
+
 def test_loose_grain_in_a_pore_is_of_the_fill():
     # a box of touching discs around a small loose one
     ring = [(1, 1), (3, 1), (5, 1), (1, 3), (5, 3), (1, 5), (3, 5), (5, 5)]
@@ -108,11 +127,11 @@ def test_falling_grid_is_airborne():
 
 
 def test_absent_grains_are_neither_fill_nor_airborne():
-    present = np.array([True, False, True])
-    # the absent one would join the other two
-    found = surface_of([1.0, 1.0, 1.0], [1.0, 3.0, 5.0], 1.0, 2.0, present=present)
-    assert found.fill.tolist() == [True, False, False]
-    assert found.airborne.tolist() == [False, False, True]
+    present = np.array([True, False, True, False])
+    # the first absent one would join its neighbours, the other is below the surface
+    found = surface_of([1.0, 1.0, 1.0, 1.0], [1.0, 3.0, 5.0, 0.5], 1.0, 2.0, present=present)
+    assert found.fill.tolist() == [True, False, False, False]
+    assert found.airborne.tolist() == [False, False, True, False]
     nothing = surface_of([1.0], [1.0], 1.0, 2.0, present=np.array([False]))
     assert not nothing.fill.any()
     assert not nothing.airborne.any()

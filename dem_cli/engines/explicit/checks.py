@@ -16,9 +16,7 @@ GAIN = 0.02  # of the energy put in: more than this out of nothing between two l
 FEEDING = 1e-3  # of the energy put in: dashpots and friction may not give back more than this
 
 
-def blown_up(
-    scenario: Scenario, state: ExplicitState, status: int, i: int, j: int, time_step: float
-) -> RunError:
+def blown_up(scenario: Scenario, state: ExplicitState, status: int, i: int, j: int, time_step: float) -> RunError:
     """The error for a status of `advance` that is not FINE: grain, time, cause and remedy."""
     grain = int(state.order[i])
     when = f"t = {state.time:.6g} s"

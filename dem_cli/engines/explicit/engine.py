@@ -15,7 +15,7 @@ from dem_cli.engines.explicit.motion import Ground, SineShaking, Still, gravity_
 from dem_cli.engines.explicit.schedule import Schedule
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.engines.explicit.timestep import choose_time_step
-from dem_cli.scenario import Scenario, Settle, Shake
+from dem_cli.scenario import Run, Scenario, Settle, Shake
 from dem_cli.state import Frame
 
 STEPS_PER_CALL = 4e7  # grain-steps between two chances to interrupt: about a second
@@ -40,14 +40,15 @@ class ExplicitEngine:
     def frames(self) -> Iterator[Frame]:
         """Frames that are due, stage after stage. RunError if the run blows up."""
         self.state.first_forces()
-        for self.stage, stage in enumerate(self.scenario.stages):
+        for number, stage in enumerate(self.scenario.stages):
+            self.stage = number
             self.stage_started = self.state.time
             ground: Ground = SineShaking.of(stage) if isinstance(stage, Shake) else Still()
             damping = (stage.damping.mass, stage.damping.local) if isinstance(stage, Settle) else (0.0, 0.0)
             yield from self._run_stage(stage, ground, damping)
             self._ground_place = self._ground_place + ground.motion(stage.longest)[0]
 
-    def _run_stage(self, stage: Settle | Shake, ground: Ground, damping: tuple[float, float]) -> Iterator[Frame]:
+    def _run_stage(self, stage: Settle | Shake | Run, ground: Ground, damping: tuple[float, float]) -> Iterator[Frame]:
         schedule = Schedule(self.scenario.output, self.stage_started, stage.longest)
         self.state.sort()
         everything = frozenset({"series", "frames", "tracks"})
@@ -81,7 +82,8 @@ class ExplicitEngine:
         done = 0
         while done < steps:
             now = min(most, steps - done)
-            driving = -ground.acceleration(start - self.stage_started + dt * np.arange(done, done + now + 1))
+            moments = np.arange(done, done + now + 1, dtype=np.float64) * dt + (start - self.stage_started)
+            driving = -ground.acceleration(moments)
             status, i, j = self.state.advance(
                 dt, self.gravity + driving, driving if ground.moves else np.zeros((0, 2)), damping
             )
@@ -120,5 +122,6 @@ class ExplicitEngine:
         return ""
 
     def _restlessness(self, frame: Frame) -> str:
-        return f"unbalanced force ratio {frame.unbalanced:.2g}, kinetic energy {self._kinetic_per_grain(frame):.2g} m g r"
-
+        return (
+            f"unbalanced force ratio {frame.unbalanced:.2g}, kinetic energy {self._kinetic_per_grain(frame):.2g} m g r"
+        )

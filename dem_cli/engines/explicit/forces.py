@@ -1,7 +1,7 @@
 """Forces of contacts on grains: discs with discs four at a time, walls one by one, both under the law of `law.py`.
 
-Lengths are metres, forces are in units of kn and times in units of the step, so that most factors vanish. A grain is one row
-of eight [x, y, u dt, v dt, q = w r dt, r, kn dt^2/m, r angle], its force one row of four [Fx, Fy, -, M/r] / kn.
+Lengths are metres, forces are in units of kn and times in units of the step, so that most factors vanish. A grain is one row of
+twelve: [x, y, u dt, v dt | q = w r dt, r, kn dt^2/m, r angle | Fx, Fy, -, M/r, all over kn]; each third of it is read at once.
 """
 
 from __future__ import annotations
@@ -20,16 +20,20 @@ from dem_cli.engines.explicit.lanes import (
     scatter_action,
     spread,
     store,
-    total,
+    unpack,
 )
 from dem_cli.engines.explicit.law import contact_force, contact_losses
 from dem_cli.jit import kernel
 
+X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, _, TURN = range(12)
+ROW = 12
+
 
 class Pairs(NamedTuple):
-    """Contacts that may open or close soon: flat arrays, a pair an entry, padded to a multiple of WIDTH.
+    """Contacts that may open or close soon: flat arrays, a pair an entry, sorted by the first body; those of two grains are padded
+    to a multiple of WIDTH.
 
-    first, second: int32 rows of the two bodies (second: number of the wall for walls); outer: entry of the list they were taken from,
+    first, second: int32 offsets of the bodies' rows, ROW times their number (second: the number of the wall for walls); outer: entry of the list they were taken from,
     -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn; inertia_root: 1/sqrt(kn dt^2/m_eff).
     """
 
@@ -57,8 +61,8 @@ def wall_direction(x, y, walls, w):
 @kernel(inline=True)
 def disc_geometry(rows, pairs, k):
     """Where the pairs k..k+3 touch and how they move: lanes (nx, ny, overlap, closing, sliding), displacements of the last step."""
-    dx, dy, du, dv = gather_difference(rows, pairs.first, pairs.second, k)
-    turning, reach = gather_sum(rows, pairs.first, pairs.second, k)
+    dx, dy, du, dv = gather_difference(rows, pairs.first, pairs.second, k, X)
+    turning, reach = gather_sum(rows, pairs.first, pairs.second, k, Q)
     distance = root(dx * dx + dy * dy)
     inverse = 1.0 / distance
     nx, ny = dx * inverse, dy * inverse
@@ -66,12 +70,14 @@ def disc_geometry(rows, pairs, k):
 
 
 @kernel(inline=True)
-def pair_law(forces, pairs, k, geometry, law, lost):
+def pair_law(rows, pairs, k, geometry, law, lost):
     """Law, forces on the grains, and memory of the pairs k..k+3; returns the losses so far, lanes."""
     nx, ny, overlap, closing, sliding = geometry
     spring = load(pairs.spring, k)
-    normal, shear, stretched = contact_force(overlap, closing, sliding, spring, load(pairs.inertia_root, k), law.friction, law)
-    scatter_action(forces, pairs.first, pairs.second, k, normal * nx + shear * ny, normal * ny - shear * nx, shear)
+    normal, shear, stretched = contact_force(
+        overlap, closing, sliding, spring, load(pairs.inertia_root, k), law.friction, law
+    )
+    scatter_action(rows, pairs.first, pairs.second, k, FX, normal * nx + shear * ny, normal * ny - shear * nx, shear)
     old = (load(pairs.dashpot_n, k), load(pairs.dashpot_s, k), spring)
     new = (normal - maximum(overlap, 0.0), shear - stretched, stretched)
     n, s, f, c = contact_losses(overlap, closing, sliding, old, new, law)
@@ -82,40 +88,42 @@ def pair_law(forces, pairs, k, geometry, law, lost):
 
 
 @kernel()
-def pair_forces(rows, forces, pairs, law, losses):
-    """Forces of all pairs of discs on their grains; memory and losses (4,) are updated in place.
+def pair_forces(rows, pairs, law, losses):
+    """Forces of all pairs of discs on their grains; rows, memory and losses (4,) change in place.
 
     losses: twice the energies of contact_losses, in units of kn. The geometry of a group of pairs is worked out while the
     law of the group before is: both wait long for their own results, so they run in each other's shade.
     """
+    end = pairs.first.size
     zero = spread(0.0)
     lost = (zero, zero, zero, zero)
     behind = disc_geometry(rows, pairs, 0)
-    for k in range(WIDTH, pairs.first.size, WIDTH):
+    for k in range(WIDTH, end, WIDTH):
         ahead = disc_geometry(rows, pairs, k)
-        lost = pair_law(forces, pairs, k - WIDTH, behind, law, lost)
+        lost = pair_law(rows, pairs, k - WIDTH, behind, law, lost)
         behind = ahead
-    lost = pair_law(forces, pairs, pairs.first.size - WIDTH, behind, law, lost)
+    lost = pair_law(rows, pairs, end - WIDTH, behind, law, lost)
     for m in range(4):
-        losses[m] += total(lost[m])
+        a, b, c, d = unpack(lost[m])
+        losses[m] += a + b + c + d
 
 
 @kernel()
-def wall_forces(rows, forces, pairs, walls, law, losses):
+def wall_forces(rows, pairs, walls, law, losses):
     """Forces of walls, bodies of infinite mass and no curvature, on grains under the same law, one contact at a time."""
     for k in range(pairs.first.size):
-        i, w = pairs.first[k], pairs.second[k]
-        a = 8 * i
-        nx, ny, distance = wall_direction(rows[a], rows[a + 1], walls, w)
-        overlap = rows[a + 5] - distance
-        closing = rows[a + 2] * nx + rows[a + 3] * ny
-        sliding = rows[a + 2] * ny - rows[a + 3] * nx - rows[a + 4]
+        a, w = pairs.first[k], pairs.second[k]
+        nx, ny, distance = wall_direction(rows[a + X], rows[a + Y], walls, w)
+        overlap = rows[a + R] - distance
+        closing = rows[a + U] * nx + rows[a + V] * ny
+        sliding = rows[a + U] * ny - rows[a + V] * nx - rows[a + Q]
         spring = pairs.spring[k]
-        normal, shear, stretched = contact_force(overlap, closing, sliding, spring, pairs.inertia_root[k], walls[w, 4], law)
-        f = 4 * i
-        forces[f] -= normal * nx + shear * ny
-        forces[f + 1] -= normal * ny - shear * nx
-        forces[f + 3] += shear
+        normal, shear, stretched = contact_force(
+            overlap, closing, sliding, spring, pairs.inertia_root[k], walls[w, 4], law
+        )
+        rows[a + FX] -= normal * nx + shear * ny
+        rows[a + FY] -= normal * ny - shear * nx
+        rows[a + TURN] += shear
         old = (pairs.dashpot_n[k], pairs.dashpot_s[k], spring)
         new = (normal - max(overlap, 0.0), shear - stretched, stretched)
         n, s, f_, c = contact_losses(overlap, closing, sliding, old, new, law)

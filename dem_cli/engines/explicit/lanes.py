@@ -1,7 +1,7 @@
 """Four numbers at once: a vector type for kernels, so that one formula serves a single contact and four of them.
 
-`Lanes` holds four doubles in one register. It knows + - * /, comparison, and the functions below; those for numbers also take plain
-floats, so a law written with them compiles for both. Rows lie in flat float64 arrays. Nothing checks bounds here: the callers pad their lists to a multiple of WIDTH.
+`Lanes` holds four doubles in one register. It knows + - * /, comparison, and the functions below; those for numbers also take
+plain floats, so a law written with them compiles for both. Rows lie in flat float64 arrays. Nothing checks bounds here: the callers pad their lists to a multiple of WIDTH.
 The code is portable LLVM, not tied to one processor, and lanes never mix in a sum, so that their number does not move results.
 """
 
@@ -75,7 +75,7 @@ def _define(operation: Any, result: types.Type, emit: Any) -> None:
     infer_global(operation)(Template)
     for pair in _MIXED:
 
-        @lower_builtin(operation, *pair)
+        @lower_builtin(operation, *pair)  # type: ignore[untyped-decorator]
         def lower(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
             return emit(builder, _spread(builder, args[0]), _spread(builder, args[1]))
 
@@ -93,7 +93,7 @@ class _Negative(ConcreteTemplate):
     cases = [signature(lanes, lanes)]  # noqa: RUF012
 
 
-@lower_builtin(operator.neg, lanes)
+@lower_builtin(operator.neg, lanes)  # type: ignore[untyped-decorator]
 def _negative(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
 
@@ -168,20 +168,6 @@ def spread(_typing, x):
     return lanes(x), emit
 
 
-@intrinsic
-def total(_typing, x):
-    """Sum of the lanes, in order."""
-
-    def emit(_context, builder, _sig, args):
-        parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), k)) for k in range(WIDTH)]
-        out = parts[0]
-        for part in parts[1:]:
-            out = builder.fadd(out, part)
-        return out
-
-    return types.float64(x), emit
-
-
 # -- memory ---------------------------------------------------------------------------------------------------------
 
 
@@ -205,13 +191,10 @@ def _word(value: int) -> Any:
     return ir.Constant(ir.IntType(64), value)
 
 
-def _rows(builder: Any, list_data: Any, k: Any, stride: int) -> list[Any]:
-    """Offsets of the rows that entries k..k+3 of an int32 list point to."""
-    out = []
-    for lane in range(WIDTH):
-        at = builder.gep(list_data, [builder.add(k, _word(lane))], inbounds=True)
-        out.append(builder.mul(builder.zext(builder.load(at), ir.IntType(64)), _word(stride)))
-    return out
+def _offsets(builder: Any, list_data: Any, k: Any) -> list[Any]:
+    """Entries k..k+3 of an int32 list of offsets."""
+    at = (builder.gep(list_data, [builder.add(k, _word(lane))], inbounds=True) for lane in range(WIDTH))
+    return [builder.zext(builder.load(pointer), ir.IntType(64)) for pointer in at]
 
 
 def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
@@ -220,12 +203,12 @@ def _shuffle(builder: Any, x: Any, y: Any, order: list[int]) -> Any:
 
 def _transpose(builder: Any, rows: list[Any], columns: int = WIDTH) -> list[Any]:
     """Four rows of four -> their first `columns` columns."""
-    even = [_shuffle(builder, rows[k], rows[k + 1], [0, 4, 2, 6]) for k in (0, 2)]
-    odd = [_shuffle(builder, rows[k], rows[k + 1], [1, 5, 3, 7]) for k in (0, 2)]
-    low, high = [0, 1, 4, 5], [2, 3, 6, 7]
-    out = [_shuffle(builder, *even, low), _shuffle(builder, *odd, low)]
+    halves = []
+    for order in ([0, 4, 2, 6], [1, 5, 3, 7]):
+        halves.append([_shuffle(builder, rows[k], rows[k + 1], order) for k in (0, 2)])
+    out = [_shuffle(builder, top, bottom, [0, 1, 4, 5]) for top, bottom in halves]
     if columns == WIDTH:
-        out += [_shuffle(builder, *even, high), _shuffle(builder, *odd, high)]
+        out += [_shuffle(builder, top, bottom, [2, 3, 6, 7]) for top, bottom in halves]
     return out
 
 
@@ -250,44 +233,53 @@ def store(_typing, array, k, value):
     return types.void(array, types.intp, value), emit
 
 
+def _chunks(context: Any, builder: Any, sig: Any, args: Any) -> tuple[Any, list[Any], list[Any]]:
+    """Data of `rows`, and where the chunk at `column` of first's and second's rows begins: arguments rows, first, second, k, column."""
+    data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
+    first, second = (
+        [builder.add(offset, args[4]) for offset in _offsets(builder, part, args[3])] for part in (one, two)
+    )
+    return data, first, second
+
+
 @intrinsic
-def gather_difference(_typing, rows, first, second, k):
-    """Columns 0..3 of rows[second] - rows[first], rows of eight, for the pairs k..k+3 of two index lists."""
+def gather_difference(_typing, rows, first, second, k, column):
+    """Four columns from `column` on of second's rows less first's, for the pairs k..k+3 of two int32 lists of offsets."""
 
     def emit(context, builder, sig, args):
-        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
-        i, j = _rows(builder, one, args[3], 8), _rows(builder, two, args[3], 8)
-        parts = [builder.fsub(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)]
+        data, i, j = _chunks(context, builder, sig, args)
+        parts = [
+            builder.fsub(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)
+        ]
         return context.make_tuple(builder, sig.return_type, _transpose(builder, parts))
 
-    return types.UniTuple(lanes, 4)(rows, first, second, types.intp), emit
+    return types.UniTuple(lanes, 4)(rows, first, second, types.intp, types.intp), emit
 
 
 @intrinsic
-def gather_sum(_typing, rows, first, second, k):
-    """Columns 4 and 5 of rows[second] + rows[first], rows of eight, for the pairs k..k+3 of two index lists."""
+def gather_sum(_typing, rows, first, second, k, column):
+    """Two columns from `column` on of second's rows plus first's, for the pairs k..k+3 of two int32 lists of offsets."""
 
     def emit(context, builder, sig, args):
-        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
-        i, j = _rows(builder, one, args[3], 8), _rows(builder, two, args[3], 8)
-        parts = []
-        for m in range(WIDTH):
-            a, b = (_read(builder, data, builder.add(row[m], _word(4))) for row in (j, i))
-            parts.append(builder.fadd(a, b, flags=_FLAGS))
+        data, i, j = _chunks(context, builder, sig, args)
+        parts = [
+            builder.fadd(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)
+        ]
         return context.make_tuple(builder, sig.return_type, _transpose(builder, parts, 2))
 
-    return types.UniTuple(lanes, 2)(rows, first, second, types.intp), emit
+    return types.UniTuple(lanes, 2)(rows, first, second, types.intp, types.intp), emit
 
 
 @intrinsic
-def scatter_action(_typing, rows, first, second, k, x, y, turn):
-    """Action and reaction of the pairs k..k+3, pair after pair: rows of four take (x, y, 0, turn) on second, (-x, -y, 0, turn) on first."""
+def scatter_action(_typing, rows, first, second, k, column, x, y, turn):
+    """Action and reaction of the pairs k..k+3, pair after pair: (x, y, 0, turn) is added to the four columns of second's row from
+    `column` on, (-x, -y, 0, turn) to those of first's.
+    """
 
     def emit(context, builder, sig, args):
-        data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))
-        i, j = _rows(builder, one, args[3], 4), _rows(builder, two, args[3], 4)
+        data, i, j = _chunks(context, builder, sig, args)
         zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
-        columns = _transpose(builder, [args[4], args[5], zero, args[6]])
+        columns = _transpose(builder, [args[5], args[6], zero, args[7]])
         integers = ir.VectorType(ir.IntType(64), WIDTH)
         signs = ir.Constant(integers, [-(1 << 63), -(1 << 63), 0, 0])
         for m in range(WIDTH):
@@ -296,4 +288,50 @@ def scatter_action(_typing, rows, first, second, k, x, y, turn):
                 _write(builder, builder.fadd(_read(builder, data, row), value), data, row)
         return context.get_dummy_value()
 
-    return types.void(rows, first, second, types.intp, x, y, turn), emit
+    return types.void(rows, first, second, types.intp, types.intp, x, y, turn), emit
+
+
+@intrinsic
+def pack(_typing, a, b, c, d):
+    """Four floats as lanes (a, b, c, d)."""
+
+    def emit(_context, builder, _sig, args):
+        out = ir.Constant(_VECTOR, ir.Undefined)
+        for lane, value in enumerate(args):
+            out = builder.insert_element(out, value, ir.Constant(ir.IntType(32), lane))
+        return out
+
+    return lanes(*[types.float64] * 4), emit
+
+
+@intrinsic
+def unpack(_typing, x):
+    """The four floats of lanes."""
+
+    def emit(context, builder, sig, args):
+        parts = [builder.extract_element(args[0], ir.Constant(ir.IntType(32), lane)) for lane in range(WIDTH)]
+        return context.make_tuple(builder, sig.return_type, parts)
+
+    return types.UniTuple(types.float64, WIDTH)(x), emit
+
+
+def _moved_halves(order: list[int]) -> Any:
+    def typed(_typing: Any, x: Any) -> Any:
+        def emit(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+            return _shuffle(builder, args[0], ir.Constant(_VECTOR, [0.0] * WIDTH), order)
+
+        return lanes(x), emit
+
+    return typed
+
+
+@intrinsic
+def first_half_last(typing, x):
+    """(a, b, c, d) -> (0, 0, a, b)."""
+    return _moved_halves([4, 4, 0, 1])(typing, x)
+
+
+@intrinsic
+def last_half_first(typing, x):
+    """(a, b, c, d) -> (c, d, 0, 0)."""
+    return _moved_halves([2, 3, 4, 4])(typing, x)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.cells import carry_memory, neighbour_list
-from dem_cli.engines.explicit.forces import Pairs, wall_direction
+from dem_cli.engines.explicit.forces import MOBILITY, ROW, Pairs, Q, R, X, Y, wall_direction
 from dem_cli.engines.explicit.lanes import WIDTH
 from dem_cli.jit import kernel
 
@@ -42,7 +42,7 @@ def _wall_list(x, y, radius, alive, walls, skin, old_grain, old_wall, old_memory
     for i in range(x.size):
         if alive[i]:
             for w in range(walls.shape[0]):
-                nx, ny, distance = wall_direction(x[i], y[i], walls, w)
+                _, _, distance = wall_direction(x[i], y[i], walls, w)
                 if distance < radius[i] + skin:
                     grain.append(np.int32(i))
                     number.append(np.int32(w))
@@ -65,14 +65,16 @@ def outer_lists(x, y, radius, alive, walls, skin, old):
     """Outer lists at the present positions [m], with the memory of the `old` Lists."""
     start, neighbour = neighbour_list(x, y, radius, alive, skin)
     memory = carry_memory(old.start, old.neighbour, old.memory, start, neighbour)
-    grain, number, wall_memory = _wall_list(x, y, radius, alive, walls, skin, old.wall_grain, old.wall_number, old.wall_memory)
+    grain, number, wall_memory = _wall_list(
+        x, y, radius, alive, walls, skin, old.wall_grain, old.wall_number, old.wall_memory
+    )
     return Lists(start, neighbour, memory, grain, number, wall_memory)
 
 
 @kernel()
 def _empty_pairs(n):
     return Pairs(
-        np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int64),
+        np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
 
@@ -85,36 +87,36 @@ def _recall(pairs, n, memory, k):
 
 @kernel()
 def inner_pairs(rows, lists, skin, deepest):
-    """Pairs of grains closer than `skin` [m], with their memory, padded to a multiple of WIDTH by a pair of far dummies.
+    """Pairs of grains closer than `skin` [m], with their memory; a pair of far dummies fills them up to a multiple of WIDTH.
 
-    rows: (n + 2) rows of `forces.py`, the last two are the dummies; deepest [-]: overlap over the smaller radius that ends the run.
+    rows ((n + 2) * ROW,): those of `forces.py`, the last two are the dummies; deepest [-]: overlap over the smaller radius that ends the run.
     Returns (pairs, status, i, j): status TOO_DEEP names the pair.
     """
     n = lists.start.size - 1
     pairs = _empty_pairs(lists.neighbour.size + WIDTH)
     count, status, bad_i, bad_j = 0, FINE, -1, -1
     for i in range(n):
-        a = 8 * i
-        x, y, r, mobility = rows[a], rows[a + 1], rows[a + 5], rows[a + 6]
-        if not (abs(x) < np.inf and abs(y) < np.inf and abs(rows[a + 4]) < np.inf):
+        a = ROW * i
+        x, y, r, mobility = rows[a + X], rows[a + Y], rows[a + R], rows[a + MOBILITY]
+        if not (abs(x) < np.inf and abs(y) < np.inf and abs(rows[a + Q]) < np.inf):
             status, bad_i = NOT_A_NUMBER, i
         for k in range(lists.start[i], lists.start[i + 1]):
-            b = 8 * np.int64(lists.neighbour[k])
-            dx, dy, reach = rows[b] - x, rows[b + 1] - y, r + rows[b + 5]
+            b = ROW * np.int64(lists.neighbour[k])
+            dx, dy, reach = rows[b + X] - x, rows[b + Y] - y, r + rows[b + R]
             square = dx * dx + dy * dy
             if square < (reach + skin) * (reach + skin):
-                pairs.first[count], pairs.second[count] = i, lists.neighbour[k]
-                pairs.inertia_root[count] = 1.0 / np.sqrt(mobility + rows[b + 6])
+                pairs.first[count], pairs.second[count] = a, b
+                pairs.inertia_root[count] = 1.0 / np.sqrt(mobility + rows[b + MOBILITY])
                 _recall(pairs, count, lists.memory, k)
                 count += 1
-                least = reach - deepest * min(r, rows[b + 5])
+                least = reach - deepest * min(r, rows[b + R])
                 if square < least * least and status == FINE:
                     status, bad_i, bad_j = TOO_DEEP, i, lists.neighbour[k]
-    padded = max(-(-count // WIDTH), 1) * WIDTH
-    for m in range(count, padded):
-        pairs.first[m], pairs.second[m], pairs.outer[m] = n, n + 1, -1
-        pairs.spring[m] = pairs.dashpot_n[m] = pairs.dashpot_s[m] = pairs.inertia_root[m] = 0.0
-    return _cut(pairs, padded), status, bad_i, bad_j
+    while count == 0 or count % WIDTH != 0:
+        pairs.first[count], pairs.second[count], pairs.outer[count] = ROW * n, ROW * (n + 1), -1
+        pairs.spring[count] = pairs.dashpot_n[count] = pairs.dashpot_s[count] = pairs.inertia_root[count] = 0.0
+        count += 1
+    return _cut(pairs, count), status, bad_i, bad_j
 
 
 @kernel()
@@ -124,14 +126,14 @@ def inner_walls(rows, lists, walls, skin, deepest):
     count, status, bad_i, bad_j = 0, FINE, -1, -1
     for k in range(lists.wall_grain.size):
         i, w = lists.wall_grain[k], lists.wall_number[k]
-        a = 8 * np.int64(i)
-        _, _, distance = wall_direction(rows[a], rows[a + 1], walls, w)
-        if distance < rows[a + 5] + skin:
-            pairs.first[count], pairs.second[count] = i, w
-            pairs.inertia_root[count] = 1.0 / np.sqrt(rows[a + 6])
+        a = ROW * np.int64(i)
+        _, _, distance = wall_direction(rows[a + X], rows[a + Y], walls, w)
+        if distance < rows[a + R] + skin:
+            pairs.first[count], pairs.second[count] = a, w
+            pairs.inertia_root[count] = 1.0 / np.sqrt(rows[a + MOBILITY])
             _recall(pairs, count, lists.wall_memory, k)
             count += 1
-            if distance < (1.0 - deepest) * rows[a + 5] and status == FINE:
+            if distance < (1.0 - deepest) * rows[a + R] and status == FINE:
                 status, bad_i, bad_j = TOO_DEEP, i, w
     return _cut(pairs, count), status, bad_i, bad_j
 

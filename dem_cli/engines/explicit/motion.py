@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -93,4 +94,4 @@ def gravity_of(scenario: Scenario) -> Floats:
     """Acceleration of gravity, (2,) [m/s^2]."""
     angle, size = scenario.container.gravity_direction, scenario.container.gravity
     # The cosine of -90 degrees is 6e-17 and would push every grain sideways.
-    return size * np.round([np.cos(angle), np.sin(angle)], 15)
+    return np.array([size * round(math.cos(angle), 15), size * round(math.sin(angle), 15)])

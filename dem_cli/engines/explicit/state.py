@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, cast
 
 import numpy as np
 
 from dem_cli.assembly import Assembly
 from dem_cli.engines.cells import order_by_columns
 from dem_cli.engines.explicit import step
-from dem_cli.engines.explicit.forces import wall_direction
+from dem_cli.engines.explicit.forces import ARC, FX, MOBILITY, ROW, Q, R, U, V, X, Y, wall_direction
 from dem_cli.engines.explicit.law import Law, make_law
 from dem_cli.engines.explicit.lists import Lists
+from dem_cli.engines.explicit.observe import touching_contacts
 from dem_cli.engines.explicit.step import DISC_INERTIA, LEAPFROG, LEDGER, THESIS, Box, Motion
 from dem_cli.scenario import Scenario
 from dem_cli.state import Bools, Contacts, Energy, Floats, Frame, Grains, Ints, Walls
 
 SKIN = 0.2  # of the mean radius
 FAR = 1e6  # m: where walls without end are cut off
-X, Y, U, V, Q, R, MOBILITY, ARC = range(8)
 
 
 @dataclass
 class ExplicitState:
     """Arrays that move, in the engine's own order of grains, and the constants that they move by.
 
-    rows (n + 2, 8) and forces (n + 2, 4) as in `forces.py`, for the step `dt`; velocity (n, 3) of the thesis' scheme; mass, radius,
+    rows (n + 2, ROW) as in `forces.py`, for the step `dt`; velocity (n, 3) of the thesis' scheme; mass, radius,
     alive, order (n,): order[k] is the id of the grain in row k. lists, travelled: see `lists.py`. ledger (step.LEDGER,) [J].
     start: stored energy at the start of the run [J]; lowest: lowest potential energy so far [J]; given: positive work so far [J].
     """
@@ -35,7 +34,6 @@ class ExplicitState:
     steps: int
     dt: float
     rows: Floats
-    forces: Floats
     velocity: Floats
     mass: Floats
     radius: Floats
@@ -64,7 +62,7 @@ class ExplicitState:
         kn, ks = scenario.stiffness
         hn, hs = scenario.contact.damping()
         contact = scenario.contact
-        rows, forces = aligned(8 * (n + 2)).reshape(-1, 8), aligned(4 * (n + 2)).reshape(-1, 4)
+        rows = aligned(ROW * (n + 2)).reshape(-1, ROW)
         rows[:n, X], rows[:n, Y], rows[:n, R] = grains.x, grains.y, grains.radius
         rows[:n, U], rows[:n, V], rows[:n, Q] = grains.vx * dt, grains.vy * dt, grains.spin * grains.radius * dt
         rows[:n, MOBILITY] = kn * dt**2 / grains.mass
@@ -74,7 +72,6 @@ class ExplicitState:
             steps=0,
             dt=dt,
             rows=rows,
-            forces=forces,
             velocity=rows[:n, U:R].copy(),
             mass=grains.mass.copy(),
             radius=grains.radius.copy(),
@@ -106,7 +103,7 @@ class ExplicitState:
         self._use_time_step(dt)
         motion = Motion(np.ascontiguousarray(field), np.ascontiguousarray(driving), *damping, self.integrator)
         self.lists, status, i, j, done = step.advance(
-            self.rows.reshape(-1), self.forces.reshape(-1), self.velocity, self.mass, self.radius, self.alive,
+            self.rows.reshape(-1), self.velocity, self.mass, self.radius, self.alive,
             self.lists, self.travelled, self.walls, self.law, motion, self.kn, dt, self.skin, self.deepest, self.box,
             self.ledger,
         )  # fmt: skip
@@ -117,7 +114,7 @@ class ExplicitState:
     def first_forces(self) -> None:
         """Forces of the contacts that exist before the first step."""
         self.lists = step.evaluate(
-            self.rows.reshape(-1), self.forces.reshape(-1), self.radius, self.alive, self.lists, self.walls, self.law, self.skin
+            self.rows.reshape(-1), self.radius, self.alive, self.lists, self.walls, self.law, self.skin
         )
         self.travelled[0] = 0.0
 
@@ -136,9 +133,11 @@ class ExplicitState:
         new = order_by_columns(self.rows[:n, X].copy(), self.rows[:n, Y].copy(), cell)
         place = np.empty(n, dtype=np.int64)
         place[new] = np.arange(n)
-        self.rows[:n], self.forces[:n] = self.rows[new], self.forces[new]
+        self.rows[:n] = self.rows[new]
         self.velocity = self.velocity[new]
-        self.mass, self.radius, self.alive, self.order = (a[new] for a in (self.mass, self.radius, self.alive, self.order))
+        self.mass, self.radius, self.alive, self.order = (
+            a[new] for a in (self.mass, self.radius, self.alive, self.order)
+        )
         i, j, memory = self._pairs()
         i, j = place[i], place[j]
         first, second = np.minimum(i, j), np.maximum(i, j)
@@ -169,7 +168,7 @@ class ExplicitState:
     def grains(self) -> Grains:
         """The grains in the order of their ids."""
         n = len(self.mass)
-        rows = np.empty((n, 8))
+        rows = np.empty((n, ROW))
         rows[self.order] = self.rows[:n]
         velocity = np.empty((n, 3))
         velocity[self.order] = self.velocity if self.integrator == THESIS else self.rows[:n, U:R]
@@ -194,34 +193,11 @@ class ExplicitState:
 
     def contacts(self) -> Contacts:
         """Contacts that touch now, by ids, sorted."""
-        i, j, memory = self._pairs()
-        x, y = self.rows[:, X], self.rows[:, Y]
-        swap = self.order[i] > self.order[j]
-        i, j = np.where(swap, j, i), np.where(swap, i, j)
-        dx, dy = x[j] - x[i], y[j] - y[i]
-        distance = np.hypot(dx, dy)
-        overlap = self.radius[i] + self.radius[j] - distance
-        on = overlap > 0.0
-        pairs = (self.order[i], self.order[j], dx / distance, dy / distance, overlap, self.radius[i], x[i], y[i])
-        grain_grain = [a[on] for a in pairs]
-        w = self.lists.wall_number.astype(np.int64)
-        k = self.lists.wall_grain.astype(np.int64)
-        nx, ny, distance = _wall_directions(x[k], y[k], self.walls[w])
-        overlap = self.radius[k] - distance
-        touching = overlap > 0.0
-        grain_wall = [a[touching] for a in (self.order[k], -1 - w, nx, ny, overlap, self.radius[k], x[k], y[k])]
-        a, b, nx, ny, overlap, r, px, py = (np.concatenate(both) for both in zip(grain_grain, grain_wall, strict=True))
-        memory = np.concatenate([memory[on], self.lists.wall_memory[touching]])
-        friction = np.concatenate([np.full(on.sum(), self.law.friction), self.walls[w[touching], 4]])
-        normal = self.kn * (overlap + memory[:, 1])
-        shear = -self.kn * (memory[:, 0] + memory[:, 2])
-        by_body = np.lexsort((b, a))
-        arm = r - 0.5 * overlap
-        columns = dict(
-            i=a, j=b, nx=nx, ny=ny, px=px + arm * nx, py=py + arm * ny, overlap=overlap, normal=normal, shear=shear,
-            stretch=memory[:, 0] * self.kn / self.ks, sliding=np.abs(shear) >= friction * normal * (1.0 - 1e-9),
-        )  # fmt: skip
-        return Contacts(**{name: cast(Any, column[by_body]) for name, column in columns.items()})
+        i, j, columns, sliding = touching_contacts(
+            self.rows.reshape(-1), self.lists, self.walls, self.order, self.law.friction, self.kn, self.ks
+        )
+        names = ("nx", "ny", "px", "py", "overlap", "normal", "shear", "stretch")
+        return Contacts(i=i, j=j, sliding=sliding, **dict(zip(names, columns, strict=True)))
 
     def positions(self) -> tuple[Floats, Floats]:
         """Centres by row [m]."""
@@ -237,7 +213,7 @@ class ExplicitState:
         contacts = self.contacts()
         n = len(self.mass)
         resultant = np.empty((n, 2))
-        resultant[self.order] = self.kn * self.forces[:n, :2] + self.mass[:, None] * gravity
+        resultant[self.order] = self.kn * self.rows[:n, FX : FX + 2] + self.mass[:, None] * gravity
         resultant[grains.escaped] = 0.0
         energy = self._energy(grains, contacts, gravity)
         if self.start is None:
@@ -292,12 +268,3 @@ def no_lists(n: int) -> Lists:
 def _wall_table(walls: Walls) -> Floats:
     ends = np.stack([walls.x0, walls.y0, walls.x1, walls.y1, walls.friction], axis=1)
     return np.ascontiguousarray(np.clip(ends, -FAR, FAR))
-
-
-def _wall_directions(x: Floats, y: Floats, walls: Floats) -> tuple[Floats, Floats, Floats]:
-    """`wall_direction` for many points (k,), each with its own wall (k, 5)."""
-    ex, ey = walls[:, 2] - walls[:, 0], walls[:, 3] - walls[:, 1]
-    along = np.clip(((x - walls[:, 0]) * ex + (y - walls[:, 1]) * ey) / (ex**2 + ey**2), 0.0, 1.0)
-    dx, dy = walls[:, 0] + along * ex - x, walls[:, 1] + along * ey - y
-    distance = np.hypot(dx, dy)
-    return dx / distance, dy / distance, distance

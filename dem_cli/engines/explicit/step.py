@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dem_cli.engines.explicit.forces import pair_forces, wall_forces
-from dem_cli.engines.explicit.lanes import load, spread, store
-from dem_cli.engines.explicit.lists import FINE, Lists, inner_pairs, inner_walls, outer_lists, remember
+from dem_cli.engines.explicit.forces import ARC, FX, FY, MOBILITY, ROW, TURN, Q, U, V, X, Y, pair_forces, wall_forces
+from dem_cli.engines.explicit.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
+from dem_cli.engines.explicit.lists import FINE, inner_pairs, inner_walls, outer_lists, remember
 from dem_cli.jit import kernel
 
 LEAPFROG, THESIS = 0, 1
@@ -45,31 +45,31 @@ class Box(NamedTuple):
 
 
 @kernel()
-def move(rows, forces, n, kick, fx, fy):
+def move(rows, n, kick, fx, fy):
     """Leapfrog without extra damping: velocities by `kick` steps of force, positions by one step; forces are set to zero.
 
     fx, fy: acceleration of the body force times dt^2 [m]. Grains without mobility stay. Returns the largest squared displacement [m^2].
     """
-    fastest = 0.0
+    body, most = pack(0.0, 0.0, fx, fy), spread(0.0)
     for i in range(n):
-        a, f = 8 * i, 4 * i
-        mobility = rows[a + 6]
-        if mobility == 0.0:
-            continue
-        u = rows[a + 2] + kick * (mobility * forces[f] + fx)
-        v = rows[a + 3] + kick * (mobility * forces[f + 1] + fy)
-        q = rows[a + 4] + kick * (DISC_INERTIA * mobility) * forces[f + 3]
-        rows[a + 2], rows[a + 3], rows[a + 4] = u, v, q
-        rows[a] += u
-        rows[a + 1] += v
-        rows[a + 7] += q
-        forces[f] = forces[f + 1] = forces[f + 3] = 0.0
-        fastest = max(fastest, u * u + v * v)
-    return fastest
+        a = ROW * i
+        mobility = rows[a + MOBILITY]
+        share = kick if mobility > 0.0 else 0.0
+        row = load(rows, a)
+        row = row + share * (mobility * first_half_last(load(rows, a + FX)) + body)
+        step = last_half_first(row)
+        q = rows[a + Q] + share * (DISC_INERTIA * mobility) * rows[a + TURN]
+        store(rows, a, row + step)
+        rows[a + Q] = q
+        rows[a + ARC] += q
+        store(rows, a + FX, spread(0.0))
+        most = maximum(step * step, most)
+    square_x, square_y, _, _ = unpack(most)
+    return square_x + square_y
 
 
 @kernel()
-def move_general(rows, forces, velocity, n, kick, drift, fx, fy, motion, dt):
+def move_general(rows, velocity, n, kick, drift, fx, fy, motion, dt):
     """Like `move`, with extra damping and the thesis' integrator, and with or without the drift; not written for speed.
 
     velocity: (n, 3) u dt, v dt, q of the thesis' scheme, which keeps them apart from the displacements of the last step.
@@ -81,30 +81,30 @@ def move_general(rows, forces, velocity, n, kick, drift, fx, fy, motion, dt):
     rate = motion.mass_damping * dt
     thesis = motion.integrator == THESIS
     for i in range(n):
-        a, f = 8 * i, 4 * i
-        mobility = rows[a + 6]
+        a = ROW * i
+        mobility = rows[a + MOBILITY]
         if mobility == 0.0:
             continue
         pushes = (
-            mobility * forces[f] + fx,
-            mobility * forces[f + 1] + fy,
-            DISC_INERTIA * mobility * forces[f + 3],
+            mobility * rows[a + FX] + fx,
+            mobility * rows[a + FY] + fy,
+            DISC_INERTIA * mobility * rows[a + TURN],
         )
         for c in range(3):
             inertia = 1.0 / (DISC_INERTIA * mobility) if c == 2 else 1.0 / mobility
-            old = velocity[i, c] if thesis else rows[a + 2 + c]
+            old = velocity[i, c] if thesis else rows[a + U + c]
             drag = rate * old + motion.local_damping * abs(pushes[c]) * np.sign(old)
             new = old + kick * (pushes[c] - drag)
             lost += inertia * kick * drag * 0.5 * (old + new)
             if thesis:
                 velocity[i, c] = new
-            rows[a + 2 + c] = 0.5 * (old + new) if thesis else new
+            rows[a + U + c] = 0.5 * (old + new) if thesis else new
         if drift:
-            rows[a] += rows[a + 2]
-            rows[a + 1] += rows[a + 3]
-            rows[a + 7] += rows[a + 4]
-            forces[f] = forces[f + 1] = forces[f + 3] = 0.0
-            fastest = max(fastest, rows[a + 2] ** 2 + rows[a + 3] ** 2)
+            rows[a + X] += rows[a + U]
+            rows[a + Y] += rows[a + V]
+            rows[a + ARC] += rows[a + Q]
+            rows[a + FX] = rows[a + FY] = rows[a + TURN] = 0.0
+            fastest = max(fastest, rows[a + U] ** 2 + rows[a + V] ** 2)
     return fastest, lost
 
 
@@ -113,26 +113,44 @@ def mass_moved(rows, mass, n):
     """Sum of mass times displacement of the last step, (x, y) [kg m]; grains that have left do not move."""
     even, odd = spread(0.0), spread(0.0)
     for i in range(0, n - 1, 2):
-        even = even + load(rows, 8 * i) * mass[i]
-        odd = odd + load(rows, 8 * i + 8) * mass[i + 1]
+        even = even + load(rows, ROW * i) * mass[i]
+        odd = odd + load(rows, ROW * (i + 1)) * mass[i + 1]
     if n % 2 == 1:
-        even = even + load(rows, 8 * (n - 1)) * mass[n - 1]
-    out = np.empty(4)
-    store(out, 0, even + odd)
-    return out[2], out[3]
+        even = even + load(rows, ROW * (n - 1)) * mass[n - 1]
+    _, _, x, y = unpack(even + odd)
+    return x, y
+
+
+@kernel()
+def _move_all(rows, velocity, mass, kick, s, motion, dt, kn, ledger):
+    """Move the grains over step s, and keep the ledger of what the body force and extra damping do."""
+    n = mass.size
+    fx, fy = motion.field[s, 0] * dt * dt, motion.field[s, 1] * dt * dt
+    thesis = motion.integrator == THESIS
+    if thesis or motion.mass_damping > 0.0 or motion.local_damping > 0.0:
+        fastest, lost = move_general(rows, velocity, n, kick, True, fx, fy, motion, dt)
+        ledger[DAMPING] += kn * lost
+    else:
+        fastest = move(rows, n, kick, fx, fy)
+    if motion.driving.shape[0] > 0:
+        px, py = mass_moved(rows, mass, n)
+        after = s if thesis else s + 1
+        ledger[WORK] += 0.5 * (motion.driving[s, 0] + motion.driving[after, 0]) * px
+        ledger[WORK] += 0.5 * (motion.driving[s, 1] + motion.driving[after, 1]) * py
+    return fastest
 
 
 @kernel()
 def _let_go(rows, mass, radius, alive, box, field, kn, ledger):
     """Take grains that have left the box out of the motion: they stay where they are, and their energy goes to ESCAPED."""
     for i in range(radius.size):
-        a = 8 * i
-        x, y = rows[a], rows[a + 1]
+        a = ROW * i
+        x, y = rows[a + X], rows[a + Y]
         if alive[i] and (x < box.left - radius[i] or x > box.right + radius[i] or y < box.bottom - radius[i]):
             alive[i] = False
-            swing = rows[a + 2] ** 2 + rows[a + 3] ** 2 + rows[a + 4] ** 2 / DISC_INERTIA
-            ledger[ESCAPED] += 0.5 * kn / rows[a + 6] * swing - mass[i] * (field[0] * x + field[1] * y)
-            rows[a + 2] = rows[a + 3] = rows[a + 4] = rows[a + 6] = 0.0
+            swing = rows[a + U] ** 2 + rows[a + V] ** 2 + rows[a + Q] ** 2 / DISC_INERTIA
+            ledger[ESCAPED] += 0.5 * kn / rows[a + MOBILITY] * swing - mass[i] * (field[0] * x + field[1] * y)
+            rows[a + U] = rows[a + V] = rows[a + Q] = rows[a + MOBILITY] = 0.0
 
 
 @kernel()
@@ -143,43 +161,27 @@ def _next_inner_skin(fastest, skin, radius_mean):
 
 @kernel()
 def advance(
-    rows, forces, velocity, mass, radius, alive, lists, travelled, walls, law, motion, kn, dt, skin, deepest, box, ledger
+    rows, velocity, mass, radius, alive, lists, travelled, walls, law, motion, kn, dt, skin, deepest, box, ledger
 ):
     """Advance all grains by field.shape[0] - 1 steps.
 
-    rows ((n + 2) * 8,), forces ((n + 2) * 4,): as in `forces.py`, changed in place; the last two rows are the dummies. velocity (n, 3): of the
+    rows ((n + 2) * ROW,): as in `forces.py`, changed in place; the last two rows are the dummies. velocity (n, 3): of the
     thesis' scheme. mass [kg], radius [m], alive: (n,). lists: Lists; travelled (1,): how far grains may have moved since they were made [m].
     walls (w, 5): x0, y0, x1, y1 [m], friction. skin [m]: of the outer lists. deepest [-]: overlap that ends the run. ledger (LEDGER,) [J].
     Returns (lists, status, i, j, steps done): status FINE, or TOO_DEEP or NOT_A_NUMBER with the bodies (j >= n: wall j - n).
     """
     n = radius.size
     steps = motion.field.shape[0] - 1
-    dt2 = dt * dt
     gravity = motion.field[0] - motion.driving[0] if motion.driving.shape[0] > 0 else motion.field[0]
-    general = motion.integrator == THESIS or motion.mass_damping > 0.0 or motion.local_damping > 0.0
-    whole_first_kick = motion.integrator == THESIS
     radius_mean = radius.mean()
-    fastest = 0.0
-    for i in range(n):
-        fastest = max(fastest, rows[8 * i + 2] ** 2 + rows[8 * i + 3] ** 2)
     losses = np.zeros(4)
     status, i, j, done = FINE, -1, -1, 0
-    room, inner_skin, fresh = 0.0, 0.0, False
+    room, fresh = 0.0, False
     pairs, _, _, _ = inner_pairs(rows, lists, 0.0, deepest)
     touching, _, _, _ = inner_walls(rows, lists, walls, 0.0, deepest)
+    first_kick = 1.0 if motion.integrator == THESIS else 0.5
     for s in range(steps):
-        kick = 1.0 if s > 0 or whole_first_kick else 0.5
-        fx, fy = motion.field[s, 0] * dt2, motion.field[s, 1] * dt2
-        if general:
-            fastest, lost = move_general(rows, forces, velocity, n, kick, True, fx, fy, motion, dt)
-            ledger[DAMPING] += kn * lost
-        else:
-            fastest = move(rows, forces, n, kick, fx, fy)
-        if motion.driving.shape[0] > 0:
-            px, py = mass_moved(rows, mass, n)
-            after = s if motion.integrator == THESIS else s + 1
-            ledger[WORK] += 0.5 * (motion.driving[s, 0] + motion.driving[after, 0]) * px
-            ledger[WORK] += 0.5 * (motion.driving[s, 1] + motion.driving[after, 1]) * py
+        fastest = _move_all(rows, velocity, mass, first_kick if s == 0 else 1.0, s, motion, dt, kn, ledger)
         moved = np.sqrt(fastest)
         travelled[0] += moved
         room -= 2.0 * moved
@@ -189,26 +191,26 @@ def advance(
                 remember(touching, lists.wall_memory)
             if 2.0 * travelled[0] > skin:
                 _let_go(rows, mass, radius, alive, box, gravity, kn, ledger)
-                lists = outer_lists(rows[0 : 8 * n : 8].copy(), rows[1 : 8 * n : 8].copy(), radius, alive, walls, skin, lists)
+                x, y = rows[X : ROW * n : ROW].copy(), rows[Y : ROW * n : ROW].copy()
+                lists = outer_lists(x, y, radius, alive, walls, skin, lists)
                 travelled[0] = 0.0
-            inner_skin = _next_inner_skin(fastest, skin, radius_mean)
-            pairs, status, i, j = inner_pairs(rows, lists, inner_skin, deepest)
-            touching, wall_status, wall_i, wall_j = inner_walls(rows, lists, walls, inner_skin, deepest)
+            room, fresh = _next_inner_skin(fastest, skin, radius_mean), True
+            pairs, status, i, j = inner_pairs(rows, lists, room, deepest)
+            touching, wall_status, wall_i, wall_j = inner_walls(rows, lists, walls, room, deepest)
             if status == FINE and wall_status != FINE:
                 status, i, j = wall_status, wall_i, n + wall_j
             if status != FINE:
                 break
-            room, fresh = inner_skin, True
-        pair_forces(rows, forces, pairs, law, losses)
-        wall_forces(rows, forces, touching, walls, law, losses)
+        pair_forces(rows, pairs, law, losses)
+        wall_forces(rows, touching, walls, law, losses)
         done += 1
-    if fresh and status == FINE:
+    if status == FINE:
         remember(pairs, lists.memory)
         remember(touching, lists.wall_memory)
-    if status == FINE and motion.integrator == LEAPFROG:
-        fx, fy = motion.field[steps, 0] * dt2, motion.field[steps, 1] * dt2
-        _, lost = move_general(rows, forces, velocity, n, 0.5, False, fx, fy, motion, dt)
-        ledger[DAMPING] += kn * lost
+        if motion.integrator == LEAPFROG:
+            fx, fy = motion.field[steps, 0] * dt * dt, motion.field[steps, 1] * dt * dt
+            _, lost = move_general(rows, velocity, n, 0.5, False, fx, fy, motion, dt)
+            ledger[DAMPING] += kn * lost
     ledger[DASHPOT_N] += 0.5 * kn * losses[0]
     ledger[DASHPOT_S] += 0.5 * kn * losses[1]
     ledger[FRICTION] += 0.5 * kn * losses[2]
@@ -217,16 +219,19 @@ def advance(
 
 
 @kernel()
-def evaluate(rows, forces, radius, alive, lists, walls, law, skin):
+def evaluate(rows, radius, alive, lists, walls, law, skin):
     """Forces at the present positions without a step, from fresh lists; the energy of what overlaps already is not a loss."""
     n = radius.size
-    lists = outer_lists(rows[0 : 8 * n : 8].copy(), rows[1 : 8 * n : 8].copy(), radius, alive, walls, skin, lists)
+    lists = outer_lists(
+        rows[X : ROW * n : ROW].copy(), rows[Y : ROW * n : ROW].copy(), radius, alive, walls, skin, lists
+    )
     pairs, _, _, _ = inner_pairs(rows, lists, skin, np.inf)
     touching, _, _, _ = inner_walls(rows, lists, walls, skin, np.inf)
     losses = np.zeros(4)
-    forces[:] = 0.0
-    pair_forces(rows, forces, pairs, law, losses)
-    wall_forces(rows, forces, touching, walls, law, losses)
+    for i in range(n):
+        rows[ROW * i + FX] = rows[ROW * i + FY] = rows[ROW * i + TURN] = 0.0
+    pair_forces(rows, pairs, law, losses)
+    wall_forces(rows, touching, walls, law, losses)
     remember(pairs, lists.memory)
     remember(touching, lists.wall_memory)
     return lists
