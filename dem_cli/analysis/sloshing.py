@@ -76,7 +76,9 @@ class SurfacePeriod:
         return self.period**2 * self.resolution
 
 
-def surface_period(time: Floats, mode: Floats, *, mean_radius: float, driving_period: float | None = None) -> SurfacePeriod:
+def surface_period(
+    time: Floats, mode: Floats, *, mean_radius: float, driving_period: float | None = None
+) -> SurfacePeriod:
     """Period of the surface motion from its mode amplitude [m] at rising times [s], shape (samples,) each.
 
     The record is brought to even times, freed of its straight line and windowed (Hann); the peak of its

@@ -79,7 +79,9 @@ def _raise_outline(x, y, radius, member, spacing, top):  # type: ignore[no-untyp
                 top[s] = max(top[s], cy + math.sqrt(abs(r * r - d * d)))
 
 
-def find_surface(x: Floats, y: Floats, radius: Floats, present: Bools, contacts: Contacts, width: float, bins: int) -> Surface:
+def find_surface(
+    x: Floats, y: Floats, radius: Floats, present: Bools, contacts: Contacts, width: float, bins: int
+) -> Surface:
     """Surface of the grains with present = True (in the container) between x = 0 and `width` [m]; arrays
     of shape (n,).
 

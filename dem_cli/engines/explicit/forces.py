@@ -33,8 +33,9 @@ class Pairs(NamedTuple):
     """Contacts that may open or close soon: flat arrays, a pair an entry, sorted by the first body; those of two grains are padded
     to a multiple of WIDTH.
 
-    first, second: int32 offsets of the bodies' rows, ROW times their number (second: the number of the wall for walls); outer: entry of the list they were taken from,
-    -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn; inertia_root: 1/sqrt(kn dt^2/m_eff).
+    first, second: int32 offsets of the bodies' rows, ROW times their number (second: the number of the wall for walls); outer: entry
+    of the list they were taken from, -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn;
+    inertia_root: 1/sqrt(kn dt^2/m_eff).
     """
 
     first: np.ndarray

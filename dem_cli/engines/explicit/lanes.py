@@ -1,8 +1,9 @@
 """Four numbers at once: a vector type for kernels, so that one formula serves a single contact and four of them.
 
 `Lanes` holds four doubles in one register. It knows + - * /, comparison, and the functions below; those for numbers also take
-plain floats, so a law written with them compiles for both. Rows lie in flat float64 arrays. Nothing checks bounds here: the callers pad their lists to a multiple of WIDTH.
-The code is portable LLVM, not tied to one processor, and lanes never mix in a sum, so that their number does not move results.
+plain floats, so a law written with them compiles for both. Rows lie in flat float64 arrays. Nothing checks bounds here: the
+callers pad their lists to a multiple of WIDTH. The code is portable LLVM, not tied to one processor. A lane never enters another
+one's sum but at the end, in order, so results do not depend on the processor's vectors.
 """
 
 from __future__ import annotations

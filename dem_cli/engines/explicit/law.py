@@ -12,9 +12,9 @@ from dem_cli.jit import kernel
 class Law(NamedTuple):
     """Constants of the law in units of kn (forces are lengths) and of a step (velocities are lengths).
 
-    friction [-] between grains; stiffness_ratio = ks/kn and its inverse; dashpots_n, dashpots_s: 2 h and 2 h sqrt(ks/kn), times 1/sqrt(kn dt^2/m_eff) of a contact;
-    pull: lowest normal force, 0 without tension, -inf where dashpots may pull; free: 0 where the limit holds for spring and dashpot
-    together, inf where for the spring alone.
+    friction [-] between grains; stiffness_ratio = ks/kn, flexibility_ratio its inverse; dashpot_n, dashpot_s: 2 hn and
+    2 hs sqrt(ks/kn), to be multiplied by 1/sqrt(kn dt^2/m_eff) of a contact; pull: lowest normal force, 0 without tension, -inf
+    where dashpots may pull; free: 0 where the limit holds for spring and dashpot together, inf where for the spring alone.
     """
 
     friction: float
