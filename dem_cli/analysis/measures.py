@@ -60,7 +60,7 @@ def measure_frame(
     number = np.count_nonzero(found.fill)
     has_bed = number > 0 and 2 * number >= np.count_nonzero(present)
 
-    inner = inner_window(width, level, window)
+    inner = inner_window(width, lowest_surface(found.eta, window), window)
     whole_solid = inner_solid = math.nan
     sigma = np.full((2, 2), math.nan)
     if has_bed:
@@ -128,6 +128,13 @@ def series_row(frame: Frame, measures: Measures) -> dict[str, float]:
         "ground_ax": ground_ax,
         "ground_ay": ground_ay,
     }
+
+
+def lowest_surface(eta: Floats, margins: WindowMargins) -> float:
+    """Lowest bin [m] of the free surface above the inner window: where the fill leans, the window stays below its surface."""
+    bins = len(eta)
+    first = min(math.floor(margins.side * bins), (bins - 1) // 2)
+    return float(eta[first : bins - first].min())
 
 
 def _center_of_mass(mass: Floats, x: Floats, y: Floats, present: Bools) -> tuple[float, float]:

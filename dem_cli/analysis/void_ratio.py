@@ -46,7 +46,7 @@ def container(width: float) -> Rectangle:
 
 
 def inner_window(width: float, depth: float, margins: WindowMargins) -> Rectangle:
-    """The window away from walls and surface of a fill of mean height `depth` [m]."""
+    """The window away from walls and surface of a fill that is at least `depth` [m] high."""
     side = margins.side * width
     return Rectangle(side, margins.bottom * depth, width - side, (1.0 - margins.top) * depth)
 

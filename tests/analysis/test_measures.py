@@ -158,3 +158,14 @@ def test_frame_without_contacts_is_refused():
     grains, width = bed()
     with pytest.raises(ValueError, match="without contacts"):
         measure_frame(frame_of(grains, None), width=width, depth=1.0)
+
+
+def test_inner_window_stays_below_a_leaning_surface():
+    """A wedge of touching discs: the window lies below the lowest surface between the sides, so no empty corner counts as voids."""
+    r, columns = 0.01, 20
+    rows = [4 + k for k in range(columns)]
+    x = np.concatenate([np.full(n, (2 * k + 1) * r) for k, n in enumerate(rows)])
+    y = np.concatenate([(2 * np.arange(n) + 1) * r for n in rows])
+    grains = discs(x, y, np.full(len(x), r))
+    leaning = measured(grains, 2 * columns * r, bins=columns)
+    assert leaning.row["porosity_inner"] == pytest.approx(1.0 - math.pi / 4.0, abs=0.05)

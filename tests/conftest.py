@@ -1,0 +1,19 @@
+"""Samples that several tests share, made once a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import pytest
+from engine_samples import settle
+
+from dem_cli.state import Grains
+
+SettledBox = Callable[[int, int], Grains]
+
+
+@pytest.fixture(scope="session")
+def settled_box() -> SettledBox:
+    """settled_box(n, seed): n grains at rest in a box 16 cm wide, see `engine_samples.settle`. Not to be changed."""
+    return cache(settle)
