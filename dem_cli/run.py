@@ -45,6 +45,7 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
                 write(writer, scenario, frame, measures, row)
                 if listener:
                     listener(frame, row if measures else None)
+                del frame, measures  # large; the next ones are made before these names are bound again
         except RunError as error:
             writer.warn(str(error))
             raise

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -26,12 +27,12 @@ SOFT: dict[str, Any] = {
 
 def soft(changes: dict[str, Any] | None = None) -> Scenario:
     """`scenario_text.small` with soft contacts, and keys changed."""
-    return parse_scenario(small({**SOFT, **(changes or {})}))
+    return parse_scenario(text_of(changes))
 
 
 def text_of(changes: dict[str, Any] | None = None) -> str:
     """The TOML of `soft`."""
-    return small({**SOFT, **(changes or {})})
+    return small(copy.deepcopy({**SOFT, **(changes or {})}))
 
 
 def engine_of(scenario: Scenario, grains: Grains | None = None) -> ExplicitEngine:
@@ -63,7 +64,7 @@ def box(changes: dict[str, Any] | None = None) -> Scenario:
         "packing.grid": ABSENT, "packing.file": "none.csv", "grains.count": ABSENT, "grains.radius": ABSENT,
         "container.width": "16 cm", "stage": [{"kind": "run", "duration": "0.3 s"}],
     }  # fmt: skip
-    return parse_scenario_without_file(small({**SOFT, **base, **(changes or {})}))
+    return parse_scenario_without_file(text_of({**base, **(changes or {})}))
 
 
 def parse_scenario_without_file(text: str) -> Scenario:
@@ -108,7 +109,9 @@ def all_wall_contacts(grains: Grains, scenario: Scenario) -> dict[tuple[int, int
         x0, y0 = float(walls.x0[w]), float(walls.y0[w])
         x1, y1 = (max(min(float(v), 1e3), -1e3) for v in (walls.x1[w], walls.y1[w]))
         for i in np.flatnonzero(~grains.escaped):
-            along = ((grains.x[i] - x0) * (x1 - x0) + (grains.y[i] - y0) * (y1 - y0)) / ((x1 - x0) ** 2 + (y1 - y0) ** 2)
+            along = ((grains.x[i] - x0) * (x1 - x0) + (grains.y[i] - y0) * (y1 - y0)) / (
+                (x1 - x0) ** 2 + (y1 - y0) ** 2
+            )
             along = min(max(float(along), 0.0), 1.0)
             distance = math.hypot(x0 + along * (x1 - x0) - grains.x[i], y0 + along * (y1 - y0) - grains.y[i])
             if distance < grains.radius[i]:

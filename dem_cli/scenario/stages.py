@@ -53,7 +53,11 @@ class Shake(Table):
     cycles: Annotated[float, Number(gt=0.0)] | None = key(
         None, "how many periods of the sine; or give duration", example=50
     )
-    ramp: DurationOrZero = key("0 s", "time over which the amplitude grows from zero at the start, and falls to zero at the end", example="0.5 s")
+    ramp: DurationOrZero = key(
+        "0 s",
+        "time over which the amplitude grows from zero at the start, and falls to zero at the end",
+        example="0.5 s",
+    )
     angle: Angle = key("0 deg", "direction of the shaking, anticlockwise from +x (to the right)", example="0 deg")
 
     alternatives: ClassVar = ((("duration",), ("cycles",)),)
@@ -65,7 +69,9 @@ class Shake(Table):
         if enough and bool(good["duration"]) != bool(good["cycles"]):
             longest = good["duration"] or good["cycles"] / good["frequency"]
             if 2.0 * good["ramp"] > longest:
-                yield Mistake(("ramp",), f"is longer than half of the stage, which takes {longest:g} s", "Shorten the ramp")
+                yield Mistake(
+                    ("ramp",), f"is longer than half of the stage, which takes {longest:g} s", "Shorten the ramp"
+                )
 
     @property
     def longest(self) -> float:

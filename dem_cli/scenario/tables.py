@@ -279,7 +279,9 @@ class Window(Table):
     side: Annotated[float, Number(ge=0.0, lt=0.5)] = key(
         0.1, "left out on each side, as a share of the width", example=0.1
     )
-    bottom: Share = key(0.1, "left out at the bottom, as a share of the height of the lowest surface between the sides", example=0.1)
+    bottom: Share = key(
+        0.1, "left out at the bottom, as a share of the height of the lowest surface between the sides", example=0.1
+    )
     top: Share = key(0.2, "left out below the lowest surface between the sides, as a share of its height", example=0.2)
 
     @classmethod

@@ -40,11 +40,13 @@ def scenario(changes: dict[str, Any] | None = None) -> Scenario:
         for parent in parents:
             table = table[parent]
         table[last] = value
+    if "restitution" in data["contact"]:
+        del data["contact"]["damping_ratio"]
     return parse_scenario(tomli_w.dumps(data))
 
 
-def floor(friction: float = 0.0, angle: float = 0.0, length: float = 1e4) -> Walls:
-    """A long floor through the origin, turned by `angle` [rad]."""
+def floor(friction: float = 0.0, angle: float = 0.0, length: float = 20.0) -> Walls:
+    """A floor through the origin, turned by `angle` [rad]."""
     x, y = 0.5 * length * np.cos(angle), 0.5 * length * np.sin(angle)
     return segments([(-x, -y, x, y)], friction)
 

@@ -10,7 +10,7 @@ from dem_cli.engines.explicit.lists import NOT_A_NUMBER
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.errors import RunError
 from dem_cli.scenario import Scenario
-from dem_cli.state import Frame
+from dem_cli.state import Energy, Frame
 
 GAIN = 0.02  # of the energy put in: more than this out of nothing between two looks is not the physics
 FEEDING = 1e-3  # of the energy put in: dashpots and friction may not give back more than this
@@ -46,14 +46,14 @@ class Watch:
     """Looks at every frame for energy that comes from nowhere: without tension an unstable step is otherwise silent."""
 
     def __init__(self) -> None:
-        self._last: Frame | None = None
+        self._last: tuple[Energy, int] | None = None
 
     def look(self, scenario: Scenario, frame: Frame, time_step: float) -> None:
         """RunError if kinetic energy rises without work, or a loss turns into a gain, since the last frame."""
-        last, self._last = self._last, frame
+        last, self._last = self._last, (frame.energy, len(frame.contacts or ()))
         if last is None or frame.energy_in <= 0.0:
             return
-        now, before = frame.energy, last.energy
+        now, (before, contacts) = frame.energy, last
         for name in ("kinetic", "elastic_normal", "friction", "dashpot_normal", "dashpot_tangential"):
             if not math.isfinite(getattr(now, name)):
                 raise RunError(f"t = {frame.time:.6g} s: the energy is no longer a number{_remedy(time_step)}")
@@ -65,7 +65,7 @@ class Watch:
             fastest = int(np.argmax(np.hypot(frame.grains.vx, frame.grains.vy)))
             raise RunError(
                 f"t = {frame.time:.6g} s: kinetic energy rose from {before.kinetic:.3g} to {now.kinetic:.3g} J with {-given:.3g} J "
-                f"out of nothing, contacts went from {len(last.contacts or ())} to {len(frame.contacts or ())}, grain "
+                f"out of nothing, contacts went from {contacts} to {len(frame.contacts or ())}, grain "
                 f"{int(frame.grains.id[fastest])} is the fastest: the time step is unstable{_remedy(time_step)}"
             )
 

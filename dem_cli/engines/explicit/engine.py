@@ -72,6 +72,7 @@ class ExplicitEngine:
                 yield replace(frame, stage_end=True, stop_reason=reason, warnings=warnings)
                 return
             yield frame
+            del frame  # a large one must not wait here while the next is made
 
     def _advance_to(self, moment: float, ground: Ground, damping: tuple[float, float]) -> None:
         """Equal steps, none longer than the time step, that end exactly at `moment` [s]."""

@@ -27,17 +27,19 @@ from dem_cli.jit import kernel
 
 X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, _, TURN = range(12)
 ROW = 12
+CHUNK = 4096  # grains whose rows and pairs fit into the second level of cache
 
 
 class Pairs(NamedTuple):
-    """Contacts that may open or close soon: flat arrays, a pair an entry, sorted by the first body; those of two grains are padded
-    to a multiple of WIDTH.
+    """Contacts that may open or close soon: flat arrays, a pair an entry, sorted by the first body.
 
+    chunk (chunks + 1,): where the pairs of each CHUNK of grains begin; those of two grains are padded to multiples of WIDTH.
     first, second: int32 offsets of the bodies' rows, ROW times their number (second: the number of the wall for walls); outer: entry
     of the list they were taken from, -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn;
     inertia_root: 1/sqrt(kn dt^2/m_eff).
     """
 
+    chunk: np.ndarray
     first: np.ndarray
     second: np.ndarray
     outer: np.ndarray
@@ -89,17 +91,18 @@ def pair_law(rows, pairs, k, geometry, law, lost):
 
 
 @kernel()
-def pair_forces(rows, pairs, law, losses):
-    """Forces of all pairs of discs on their grains; rows, memory and losses (4,) change in place.
+def pair_forces(rows, pairs, begin, end, law, losses):
+    """Forces of the pairs begin..end-1 of discs on their grains; rows, memory and losses (4,) change in place.
 
     losses: twice the energies of contact_losses, in units of kn. The geometry of a group of pairs is worked out while the
     law of the group before is: both wait long for their own results, so they run in each other's shade.
     """
-    end = pairs.first.size
+    if begin == end:
+        return
     zero = spread(0.0)
     lost = (zero, zero, zero, zero)
-    behind = disc_geometry(rows, pairs, 0)
-    for k in range(WIDTH, end, WIDTH):
+    behind = disc_geometry(rows, pairs, begin)
+    for k in range(begin + WIDTH, end, WIDTH):
         ahead = disc_geometry(rows, pairs, k)
         lost = pair_law(rows, pairs, k - WIDTH, behind, law, lost)
         behind = ahead
@@ -110,9 +113,9 @@ def pair_forces(rows, pairs, law, losses):
 
 
 @kernel()
-def wall_forces(rows, pairs, walls, law, losses):
+def wall_forces(rows, pairs, begin, end, walls, law, losses):
     """Forces of walls, bodies of infinite mass and no curvature, on grains under the same law, one contact at a time."""
-    for k in range(pairs.first.size):
+    for k in range(begin, end):
         a, w = pairs.first[k], pairs.second[k]
         nx, ny, distance = wall_direction(rows[a + X], rows[a + Y], walls, w)
         overlap = rows[a + R] - distance

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.cells import carry_memory, neighbour_list
-from dem_cli.engines.explicit.forces import MOBILITY, ROW, Pairs, Q, R, X, Y, wall_direction
+from dem_cli.engines.explicit.forces import CHUNK, MOBILITY, ROW, Pairs, Q, R, X, Y, wall_direction
 from dem_cli.engines.explicit.lanes import WIDTH
 from dem_cli.jit import kernel
 
@@ -72,9 +72,9 @@ def outer_lists(x, y, radius, alive, walls, skin, old):
 
 
 @kernel()
-def _empty_pairs(n):
+def _empty_pairs(grains, n):
     return Pairs(
-        np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32),
+        np.zeros(-(-grains // CHUNK) + 1, np.int64), np.empty(n, np.int32), np.empty(n, np.int32), np.empty(n, np.int32),
         np.empty(n), np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
 
@@ -87,13 +87,13 @@ def _recall(pairs, n, memory, k):
 
 @kernel()
 def inner_pairs(rows, lists, skin, deepest):
-    """Pairs of grains closer than `skin` [m], with their memory; a pair of far dummies fills them up to a multiple of WIDTH.
+    """Pairs of grains closer than `skin` [m], with their memory; a pair of far dummies fills up each chunk.
 
     rows ((n + 2) * ROW,): those of `forces.py`, the last two are the dummies; deepest [-]: overlap over the smaller radius that ends the run.
     Returns (pairs, status, i, j): status TOO_DEEP names the pair.
     """
     n = lists.start.size - 1
-    pairs = _empty_pairs(lists.neighbour.size + WIDTH)
+    pairs = _empty_pairs(n, lists.neighbour.size + WIDTH * (n // CHUNK + 1))
     count, status, bad_i, bad_j = 0, FINE, -1, -1
     for i in range(n):
         a = ROW * i
@@ -112,17 +112,19 @@ def inner_pairs(rows, lists, skin, deepest):
                 least = reach - deepest * min(r, rows[b + R])
                 if square < least * least and status == FINE:
                     status, bad_i, bad_j = TOO_DEEP, i, lists.neighbour[k]
-    while count == 0 or count % WIDTH != 0:
-        pairs.first[count], pairs.second[count], pairs.outer[count] = ROW * n, ROW * (n + 1), -1
-        pairs.spring[count] = pairs.dashpot_n[count] = pairs.dashpot_s[count] = pairs.inertia_root[count] = 0.0
-        count += 1
+        if (i + 1) % CHUNK == 0 or i == n - 1:
+            while count % WIDTH != 0:
+                pairs.first[count], pairs.second[count], pairs.outer[count] = ROW * n, ROW * (n + 1), -1
+                pairs.spring[count] = pairs.dashpot_n[count] = pairs.dashpot_s[count] = pairs.inertia_root[count] = 0.0
+                count += 1
+            pairs.chunk[i // CHUNK + 1] = count
     return _cut(pairs, count), status, bad_i, bad_j
 
 
 @kernel()
 def inner_walls(rows, lists, walls, skin, deepest):
     """Contacts of grains with walls closer than `skin` [m]: as `inner_pairs`, without padding; j is the wall."""
-    pairs = _empty_pairs(lists.wall_grain.size)
+    pairs = _empty_pairs(lists.start.size - 1, lists.wall_grain.size)
     count, status, bad_i, bad_j = 0, FINE, -1, -1
     for k in range(lists.wall_grain.size):
         i, w = lists.wall_grain[k], lists.wall_number[k]
@@ -135,13 +137,16 @@ def inner_walls(rows, lists, walls, skin, deepest):
             count += 1
             if distance < (1.0 - deepest) * rows[a + R] and status == FINE:
                 status, bad_i, bad_j = TOO_DEEP, i, w
+            pairs.chunk[i // CHUNK + 1] = count
+    for c in range(1, pairs.chunk.size):
+        pairs.chunk[c] = max(pairs.chunk[c], pairs.chunk[c - 1])
     return _cut(pairs, count), status, bad_i, bad_j
 
 
 @kernel()
 def _cut(pairs, n):
     return Pairs(
-        pairs.first[:n], pairs.second[:n], pairs.outer[:n], pairs.spring[:n],
+        pairs.chunk, pairs.first[:n], pairs.second[:n], pairs.outer[:n], pairs.spring[:n],
         pairs.dashpot_n[:n], pairs.dashpot_s[:n], pairs.inertia_root[:n],
     )  # fmt: skip
 

@@ -10,7 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dem_cli.engines.explicit.forces import ARC, FX, FY, MOBILITY, ROW, TURN, Q, U, V, X, Y, pair_forces, wall_forces
+from dem_cli.engines.explicit.forces import (
+    ARC,
+    CHUNK,
+    FX,
+    FY,
+    MOBILITY,
+    ROW,
+    TURN,
+    Q,
+    U,
+    V,
+    X,
+    Y,
+    pair_forces,
+    wall_forces,
+)
 from dem_cli.engines.explicit.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
 from dem_cli.engines.explicit.lists import FINE, inner_pairs, inner_walls, outer_lists, remember
 from dem_cli.jit import kernel
@@ -45,13 +60,13 @@ class Box(NamedTuple):
 
 
 @kernel()
-def move(rows, n, kick, fx, fy):
-    """Leapfrog without extra damping: velocities by `kick` steps of force, positions by one step; forces are set to zero.
+def move(rows, begin, end, kick, fx, fy):
+    """Leapfrog of the grains begin..end-1 without extra damping: velocities by `kick` steps of force, positions by one step; forces are set to zero.
 
     fx, fy: acceleration of the body force times dt^2 [m]. Grains without mobility stay. Returns the largest squared displacement [m^2].
     """
     body, most = pack(0.0, 0.0, fx, fy), spread(0.0)
-    for i in range(n):
+    for i in range(begin, end):
         a = ROW * i
         mobility = rows[a + MOBILITY]
         share = kick if mobility > 0.0 else 0.0
@@ -71,7 +86,7 @@ def move(rows, n, kick, fx, fy):
 
 
 @kernel()
-def move_general(rows, velocity, n, kick, drift, fx, fy, motion, dt):
+def move_general(rows, velocity, begin, end, kick, drift, fx, fy, motion, dt):
     """Like `move`, with extra damping and the thesis' integrator, and with or without the drift; not written for speed.
 
     velocity: (n, 3) u dt, v dt, q of the thesis' scheme, which keeps them apart from the displacements of the last step.
@@ -82,7 +97,7 @@ def move_general(rows, velocity, n, kick, drift, fx, fy, motion, dt):
     fastest, lost = 0.0, 0.0
     rate = motion.mass_damping * dt
     thesis = motion.integrator == THESIS
-    for i in range(n):
+    for i in range(begin, end):
         a = ROW * i
         mobility = rows[a + MOBILITY]
         if mobility == 0.0:
@@ -173,14 +188,26 @@ def advance(
     touching, _, _, _ = inner_walls(rows, lists, walls, 0.0, deepest)
     thesis = motion.integrator == THESIS
     general = thesis or motion.mass_damping > 0.0 or motion.local_damping > 0.0
-    for s in range(steps):
+    fastest = 0.0
+    for s in range(steps + 1):
+        # All pairs of a chunk of grains with earlier grains are done once its own are: it is moved while it is in the cache.
         kick = 0.5 if s == 0 and not thesis else 1.0
         fx, fy = motion.field[s, 0] * dt * dt, motion.field[s, 1] * dt * dt
-        if general:
-            fastest, lost = move_general(rows, velocity, n, kick, True, fx, fy, motion, dt)
-            ledger[DAMPING] += kn * lost
-        else:
-            fastest = move(rows, n, kick, fx, fy)
+        fastest = 0.0
+        for c in range(pairs.chunk.size - 1):
+            begin, end = c * CHUNK, min((c + 1) * CHUNK, n)
+            if s > 0:
+                pair_forces(rows, pairs, pairs.chunk[c], pairs.chunk[c + 1], law, losses)
+                wall_forces(rows, touching, touching.chunk[c], touching.chunk[c + 1], walls, law, losses)
+            if s < steps and general:
+                fast, lost = move_general(rows, velocity, begin, end, kick, True, fx, fy, motion, dt)
+                ledger[DAMPING] += kn * lost
+                fastest = max(fastest, fast)
+            elif s < steps:
+                fastest = max(fastest, move(rows, begin, end, kick, fx, fy))
+        done = s
+        if s == steps:
+            break
         if motion.driving.shape[0] > 0:
             _work(rows, mass, motion, s, ledger)
         moved = np.sqrt(fastest)
@@ -202,15 +229,12 @@ def advance(
                 status, i, j = wall_status, wall_i, n + wall_j
             if status != FINE:
                 break
-        pair_forces(rows, pairs, law, losses)
-        wall_forces(rows, touching, walls, law, losses)
-        done += 1
     if status == FINE:
         remember(pairs, lists.memory)
         remember(touching, lists.wall_memory)
         if motion.integrator == LEAPFROG:
             fx, fy = motion.field[steps, 0] * dt * dt, motion.field[steps, 1] * dt * dt
-            _, lost = move_general(rows, velocity, n, 0.5, False, fx, fy, motion, dt)
+            _, lost = move_general(rows, velocity, 0, n, 0.5, False, fx, fy, motion, dt)
             ledger[DAMPING] += kn * lost
     ledger[DASHPOT_N] += 0.5 * kn * losses[0]
     ledger[DASHPOT_S] += 0.5 * kn * losses[1]
@@ -231,8 +255,8 @@ def evaluate(rows, radius, alive, lists, walls, law, skin):
     losses = np.zeros(4)
     for i in range(n):
         rows[ROW * i + FX] = rows[ROW * i + FY] = rows[ROW * i + TURN] = 0.0
-    pair_forces(rows, pairs, law, losses)
-    wall_forces(rows, touching, walls, law, losses)
+    pair_forces(rows, pairs, 0, pairs.first.size, law, losses)
+    wall_forces(rows, touching, 0, touching.first.size, walls, law, losses)
     remember(pairs, lists.memory)
     remember(touching, lists.wall_memory)
     return lists
