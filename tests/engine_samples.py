@@ -32,7 +32,7 @@ def soft(changes: dict[str, Any] | None = None) -> Scenario:
 
 def text_of(changes: dict[str, Any] | None = None) -> str:
     """The TOML of `soft`."""
-    return small(copy.deepcopy({**SOFT, **(changes or {})}))
+    return small({**{k: v if v is ABSENT else copy.deepcopy(v) for k, v in SOFT.items()}, **(changes or {})})
 
 
 def engine_of(scenario: Scenario, grains: Grains | None = None) -> ExplicitEngine:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,6 +13,7 @@ from dem_cli.state import Frame
 
 LOG_EVERY = 10.0  # s of wall time between two lines in a log
 DRAW_EVERY = 0.2  # s between two updates of the bar
+SPEED_OVER = 10.0  # s of wall time that the speed is an average of
 
 
 class Progress:
@@ -20,8 +22,9 @@ class Progress:
     def __init__(self, scenario: Scenario, verbosity: int = 0) -> None:
         self.scenario = scenario
         self.silent = verbosity < 0
-        self._began = self._shown = time.monotonic()
-        self._first_step: tuple[float, int] | None = None
+        self._shown = time.monotonic()
+        self._stage_began = 0.0
+        self._marks: deque[tuple[float, int]] = deque()  # wall time and step of late frames
         self._row: Mapping[str, float] | None = None
         self._bar: Any = None
         self._task: Any = None
@@ -53,8 +56,11 @@ class Progress:
 
     def __call__(self, frame: Frame, row: Mapping[str, float] | None) -> None:
         self._row = row or self._row
-        if self._first_step is None:
-            self._first_step = (time.monotonic(), frame.step)
+        if frame.stage_start:
+            self._stage_began = frame.time
+        self._marks.append((time.monotonic(), frame.step))
+        while self._marks[-1][0] - self._marks[0][0] > SPEED_OVER and len(self._marks) > 2:
+            self._marks.popleft()
         for warning in frame.warnings:
             self.say(f"warning: {warning}")
         stage = self.scenario.stages[frame.stage]
@@ -64,7 +70,7 @@ class Progress:
                 f"{frame.step} steps, void ratio {self._row['void_ratio']:.4f}: {frame.stop_reason}"
             )
         now = time.monotonic()
-        if not self.silent and now - self._shown >= (DRAW_EVERY if self._bar else LOG_EVERY):
+        if not self.silent and frame.step > 0 and now - self._shown >= (DRAW_EVERY if self._bar else LOG_EVERY):
             self._shown = now
             self._show(frame, stage.name)
 
@@ -78,9 +84,8 @@ class Progress:
 
     def words(self, frame: Frame) -> str:
         """Simulated time, speed, time left at most, kinetic energy and void ratio."""
-        assert self._first_step is not None
-        wall = time.monotonic() - self._first_step[0]
-        speed = (frame.step - self._first_step[1]) / wall if wall > 0.0 else 0.0
+        (began, first), (now, last) = self._marks[0], self._marks[-1]
+        speed = (last - first) / (now - began) if now > began else 0.0
         left = self._steps_left(frame) / speed if speed > 0.0 else float("inf")
         parts = [f"t = {frame.time:.3f} s", f"{speed:,.0f} steps/s", f"at most {clock(left)} left"]
         if self._row:
@@ -92,9 +97,7 @@ class Progress:
         return max(self._end(frame) - frame.time + later, 0.0) / frame.dt
 
     def _end(self, frame: Frame) -> float:
-        if frame.stage_start:
-            self._stage_began = frame.time
-        return getattr(self, "_stage_began", 0.0) + self.scenario.stages[frame.stage].longest
+        return self._stage_began + self.scenario.stages[frame.stage].longest
 
     def _share(self, frame: Frame) -> float:
         total = sum(stage.longest for stage in self.scenario.stages)
