@@ -32,7 +32,8 @@ def soft(changes: dict[str, Any] | None = None) -> Scenario:
 
 def text_of(changes: dict[str, Any] | None = None) -> str:
     """The TOML of `soft`."""
-    return small({**{k: v if v is ABSENT else copy.deepcopy(v) for k, v in SOFT.items()}, **(changes or {})})
+    wanted = {**SOFT, **(changes or {})}
+    return small({name: value if value is ABSENT else copy.deepcopy(value) for name, value in wanted.items()})
 
 
 def engine_of(scenario: Scenario, grains: Grains | None = None) -> ExplicitEngine:

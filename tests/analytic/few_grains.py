@@ -59,7 +59,7 @@ def segments(ends: Sequence[tuple[float, float, float, float]], friction: float 
 
 @dataclass
 class Bench:
-    """A state and what pushes it; grains start in reach of x = -1000 km, so that none escapes unless a test wants it."""
+    """A state and what pushes it."""
 
     state: ExplicitState
     gravity: Floats

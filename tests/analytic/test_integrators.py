@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from few_grains import KN, KS, MASS, RADIUS, G, Bench, few_grains, floor, run_for, segments, series
+from few_grains import KN, MASS, RADIUS, Bench, G, few_grains, floor, run_for, segments, series
 
 from dem_cli.engines.explicit.lists import FINE
 from dem_cli.engines.explicit.timestep import critical_time_step, thesis_time_step
@@ -40,7 +40,7 @@ def test_thesis_scheme_amplifies(omega_dt):
     steps = int(math.log(4.0) / math.log(growth))  # the amplitude doubles: both walls still press
     frames = run_for(squeezed(dt, "thesis"), steps * dt)
     x, v = series(frames, "x"), series(frames, "vx")
-    size = v**2 - OMEGA * omega_dt / 2.0 * OMEGA * x * v / OMEGA + (OMEGA * x) ** 2
+    size = v**2 - 0.5 * OMEGA * omega_dt * x * v + (OMEGA * x) ** 2
     np.testing.assert_allclose(size[1:] / size[:-1], growth, rtol=1e-9)
     assert size[-1] / size[0] > 3.0
 
@@ -65,15 +65,13 @@ def test_thesis_scheme_falls_exactly():
 
 def test_leapfrog_bounces_a_hundred_times():
     height = 2.0 * RADIUS
-    dt = 0.1 * math.sqrt(MASS / KN)
+    dt = 0.05 * math.sqrt(MASS / KN)
     bench = few_grains([0.0], [RADIUS + height], walls=floor(), gravity=(0.0, -G), dt=dt)
-    period = 2.0 * math.sqrt(2.0 * height / G)
-    frames = run_for(bench, 103 * period, every=5)
-    y, vy = series(frames, "y"), series(frames, "vy")
+    frames = run_for(bench, 103 * 2.0 * math.sqrt(2.0 * height / G), every=100)
+    vy = series(frames, "vy")
     energy = np.array([frame.energy.stored for frame in frames]) / (MASS * G * height)
     flying = np.array([len(frame.contacts) == 0 for frame in frames])
-    bounces = np.count_nonzero((vy[:-1] < 0.0) & (vy[1:] >= 0.0) & (y[1:] < 1.5 * RADIUS))
-    assert bounces >= 100
+    assert np.count_nonzero((vy[:-1] < 0.0) & (vy[1:] >= 0.0)) >= 100
     drift = energy - energy[0]
     np.testing.assert_allclose(drift[flying], 0.0, atol=2e-3)
     # What the opening and closing within a step does to the energy is known; nothing else happens to it.
@@ -129,8 +127,23 @@ def test_local_damping_shares_the_force():
 SIZE = 12
 
 
-def lattice(h: float, ks: float, share: float) -> Bench:
-    """A hexagonal patch squeezed in a box, slightly shaken, moved by `share` of the critical time step."""
+def lattice_limit(ks: float, h: float) -> float:
+    """Largest stable step [s] of an endless hexagonal lattice, from its two fastest modes; at most 11 % below the truth.
+
+    A mode with stiffness K, dashpots C and mass m has w^2 = K/m, z = C/(2 m w) and the limit (2/w) (sqrt(1 + z^2) - z).
+    Neighbours that move against each other: K = 6 (kn + ks), C = 6 (cn + cs). All turn in one sense: K = 24 ks, C = 24 cs.
+    """
+    cn, cs = (2.0 * h * math.sqrt(0.5 * MASS * k) for k in (KN, ks))
+    limits = []
+    for stiffness, dashpots in ((6.0 * (KN + ks), 6.0 * (cn + cs)), (24.0 * ks, 24.0 * cs)):
+        omega = math.sqrt(stiffness / MASS)
+        z = dashpots / (2.0 * MASS * omega)
+        limits.append(2.0 / omega * (math.sqrt(1.0 + z * z) - z))
+    return min(limits)
+
+
+def lattice(h: float, ks: float) -> Bench:
+    """A hexagonal patch squeezed in a box and at rest there."""
     overlap = 1e-3 * RADIUS
     side, row = 2.0 * RADIUS - overlap, (2.0 * RADIUS - overlap) * 0.5 * math.sqrt(3.0)
     x = np.concatenate([np.arange(SIZE - k % 2) * side + (k % 2) * 0.5 * side for k in range(SIZE + 1)])
@@ -138,32 +151,59 @@ def lattice(h: float, ks: float, share: float) -> Bench:
     edge = RADIUS - 0.5 * overlap
     left, right, bottom, top = -edge, x.max() + edge, -edge, y.max() + edge
     walls = segments(
-        [(left, bottom, left, top), (right, bottom, right, top), (left, bottom, right, bottom), (left, top, right, top)],
+        [
+            (left, bottom, left, top),
+            (right, bottom, right, top),
+            (left, bottom, right, bottom),
+            (left, top, right, top),
+        ],
         1e3,
     )
-    dt = share * critical_time_step(KN, ks, MASS, h, h)
-    generator = np.random.default_rng(5)
-    vx, vy, spin = generator.normal(0.0, 1e-4 * overlap / math.sqrt(MASS / KN), (3, len(x)))
-    return few_grains(
-        x, y, vx=vx, vy=vy, spin=spin / RADIUS, walls=walls, dt=dt, contact_friction=1e3,
-        contact_damping_ratio=h, contact_tension="damping", material_tangential_stiffness=f"{ks!r} N/m",
+    omega = math.sqrt(KN / MASS)
+    bench = few_grains(
+        x, y, walls=walls, dt=0.02 / omega, contact_friction=1e3, contact_damping_ratio=h, contact_tension="damping",
+        material_tangential_stiffness=f"{ks!r} N/m",
     )  # fmt: skip
+    assert bench.steps(5000, damping=(0.3 * omega, 0.0)) == FINE
+    return bench
 
 
-def loudness(bench: Bench, steps: int) -> float:
-    """Kinetic energy after many steps over the one at the start; infinite where the run broke down."""
+def loudness(bench: Bench, dt: float, steps: int) -> float:
+    """Kinetic energy after many steps over that of a small disturbance at the start; infinite where the run broke down."""
+    state = bench.state
+    n = len(state.mass)
+    size = 1e-7 * RADIUS * math.sqrt(KN / MASS) * state.dt
+    state.rows[:n, 2:5] = np.random.default_rng(5).normal(0.0, size, (n, 3))
     start = bench.frame().energy.kinetic
-    return bench.frame().energy.kinetic / start if bench.steps(steps) == FINE else math.inf
+    return bench.frame().energy.kinetic / start if bench.steps(steps, dt) == FINE else math.inf
 
 
-@pytest.mark.parametrize("ks", [KN / 3.0, KN, 0.05 * KN])
+@pytest.mark.parametrize("ks", [KN / 3.0, KN, 0.1 * KN])
 @pytest.mark.parametrize("h", [0.0, 0.3, 1.0])
 def test_limit_of_the_time_step_is_sharp(h, ks):
-    for share in (0.9, 0.95, 1.0, 1.05, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0):
-        print("LOUD", h, ks / KN, share, loudness(lattice(h, ks, share), 3000))
+    limit = lattice_limit(ks, h)
+    quiet = loudness(lattice(h, ks), 0.9 * limit, 3000)
+    loud = loudness(lattice(h, ks), 1.35 * limit, 3000)
+    assert quiet < (2.0 if h == 0.0 else 1e-6)
+    assert loud > 100.0
+
+
+UNDERRATED = pytest.mark.xfail(reason="critical_time_step underrates the dashpots of ks by sqrt(kn/ks)")
+
+
+@pytest.mark.parametrize(
+    ("ratio", "h"),
+    [(1.0, 0.0), (1.0, 0.3), (1.0, 1.0), (0.5, 0.0), (1.0 / 3.0, 0.0)]
+    + [pytest.param(ratio, h, marks=UNDERRATED) for ratio in (0.5, 1.0 / 3.0) for h in (0.1, 0.3, 1.0)],
+)
+def test_engine_stays_below_the_limit_of_a_lattice(ratio, h):
+    found = critical_time_step(KN, ratio * KN, MASS, h, h)
+    assert 0.8 * lattice_limit(ratio * KN, h) < found < 1.001 * lattice_limit(ratio * KN, h)
 
 
 def test_time_steps_in_closed_form():
     np.testing.assert_allclose(thesis_time_step(KN, MASS), 2.0 * math.pi * math.sqrt(MASS / KN) / 8.0, rtol=1e-14)
     # without dashpots 2/w of the fastest mode: w^2 = 8 kn/m for ks = kn/3
-    np.testing.assert_allclose(critical_time_step(KN, KN / 3.0, MASS, 0.0, 0.0), 2.0 / math.sqrt(8.0 * KN / MASS), rtol=1e-14)
+    np.testing.assert_allclose(
+        critical_time_step(KN, KN / 3.0, MASS, 0.0, 0.0), 2.0 / math.sqrt(8.0 * KN / MASS), rtol=1e-14
+    )

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from few_grains import KN, KS, MASS, RADIUS, G, Bench, few_grains, floor, run_for, series, times
+from few_grains import KN, KS, MASS, RADIUS, Bench, G, few_grains, floor, run_for, series, times
 
 from dem_cli.scenario.restitution import restitution
 
@@ -84,7 +84,7 @@ def test_sliding_comes_to_roll(h, angle):
     u, rw = along(frames, angle)
     t = times(frames)
     slides = t < 0.98 * until
-    # From the second frame on the spring is at its limit; it takes mu m g / ks of a path to get there.
+    # The spring is at its limit at once: it takes mu m g / ks of a path to get there.
     np.testing.assert_allclose(u[slides], u0 - mu * G * t[slides], rtol=0, atol=4e-5 * u0)
     np.testing.assert_allclose(rw[slides], -2.0 * mu * G * t[slides], rtol=0, atol=8e-5 * u0)
     # The point of contact conserves m u - I w / r, whatever the friction does.

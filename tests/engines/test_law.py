@@ -51,7 +51,9 @@ def four_losses(inputs, law, out):
     store(out, 12, d)
 
 
-def law_of(tension: str = "none", slider: str = "total", friction: float = 0.3, ratio: float = 0.5, h: float = 0.3) -> Law:
+def law_of(
+    tension: str = "none", slider: str = "total", friction: float = 0.3, ratio: float = 0.5, h: float = 0.3
+) -> Law:
     """A law with these words, damping ratio h in both directions."""
     return make_law(friction, KN, ratio * KN, h, h, tension=tension, slider=slider)
 
@@ -236,18 +238,28 @@ def test_smooth_path_loses(law, speed, frequency, drift, swing, phase):
     assert path.lost[:3].sum() >= -rounding
 
 
-def test_oscillating_sliding_loses_the_loop():
-    # Constant overlap, sliding to and fro by +-a beyond the limit: the loop of force over path has the area 4 mu N (a - mu N/ks).
-    law = law_of(h=0.0, friction=0.3, ratio=0.5)
-    path = Path(law, overlap=1.0)
-    limit, reach = 0.3, 2.0
-    for target in (reach, -reach, reach):
-        if target == reach and path.work > 0.0:
-            before = path.lost[2]
-        for _ in range(1000):
-            path.step(0.0, (reach if path.work == 0.0 else 2.0 * reach) / 1000 * math.copysign(1.0, target))
-    del before
-    assert limit
+def test_loop_of_force_over_path():
+    # Constant overlap, sliding to and fro by a on each side: the loop has the area 4 mu N (a - mu N/ks), all of it friction.
+    ratio, limit, reach, steps = 0.5, 0.3, 2.0, 1000
+    path = Path(law_of(h=0.0, friction=limit, ratio=ratio), overlap=1.0)
+    lost = []
+    for way in (reach, -2.0 * reach, 2.0 * reach):
+        for _ in range(steps):
+            path.step(0.0, way / steps)
+        lost.append(path.lost[2])
+    assert path.shear == pytest.approx(limit, rel=1e-14)
+    assert lost[2] - lost[0] == pytest.approx(4.0 * limit * (reach - limit / ratio), rel=1e-12)
+    assert path.lost[[0, 1, 3]].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_crossing_counts_what_a_step_skips():
+    # Opening by a step from overlap d to a gap g: the spring's force d acted over half the step more than it should, d g/2.
+    path = Path(law_of(h=0.0), overlap=0.2)
+    path.step(-0.5, 0.0)
+    np.testing.assert_allclose(path.lost, [0.0, 0.0, 0.0, 0.5 * 0.2 * 0.3], rtol=1e-14)
+    path = Path(law_of(h=0.0), overlap=-0.3)
+    path.step(0.5, 0.0)
+    np.testing.assert_allclose(path.lost, [0.0, 0.0, 0.0, -0.5 * 0.2 * 0.3], rtol=1e-14)
 
 
 def test_make_law():

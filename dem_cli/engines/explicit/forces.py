@@ -62,51 +62,56 @@ def wall_direction(x, y, walls, w):
 
 
 @kernel(inline=True)
-def disc_geometry(rows, pairs, k):
-    """Where the pairs k..k+3 touch and how they move: lanes (nx, ny, overlap, closing, sliding), displacements of the last step."""
+def _approach(rows, pairs, k):
+    """Relative place and motion of the pairs k..k+3 and the distance of their centres, lanes."""
     dx, dy, du, dv = gather_difference(rows, pairs.first, pairs.second, k, X)
     turning, reach = gather_sum(rows, pairs.first, pairs.second, k, Q)
-    distance = root(dx * dx + dy * dy)
-    inverse = 1.0 / distance
-    nx, ny = dx * inverse, dy * inverse
-    return nx, ny, reach - distance, -(du * nx + dv * ny), dv * nx - du * ny - turning
+    return dx, dy, du, dv, turning, reach, root(dx * dx + dy * dy)
 
 
 @kernel(inline=True)
-def pair_law(rows, pairs, k, geometry, law, lost):
-    """Law, forces on the grains, and memory of the pairs k..k+3; returns the losses so far, lanes."""
-    nx, ny, overlap, closing, sliding = geometry
+def _contact(pairs, k, approach, law, lost):
+    """Law and memory of the pairs k..k+3: forces on the second discs (x, y, turn) and the losses so far, lanes."""
+    dx, dy, du, dv, turning, reach, distance = approach
+    inverse = 1.0 / distance
+    nx, ny = dx * inverse, dy * inverse
+    overlap, closing, sliding = reach - distance, -(du * nx + dv * ny), dv * nx - du * ny - turning
     spring = load(pairs.spring, k)
     normal, shear, stretched = contact_force(
         overlap, closing, sliding, spring, load(pairs.inertia_root, k), law.friction, law
     )
-    scatter_action(rows, pairs.first, pairs.second, k, FX, normal * nx + shear * ny, normal * ny - shear * nx, shear)
     old = (load(pairs.dashpot_n, k), load(pairs.dashpot_s, k), spring)
     new = (normal - maximum(overlap, 0.0), shear - stretched, stretched)
     n, s, f, c = contact_losses(overlap, closing, sliding, old, new, law)
     store(pairs.spring, k, stretched)
     store(pairs.dashpot_n, k, new[0])
     store(pairs.dashpot_s, k, new[1])
-    return lost[0] + n, lost[1] + s, lost[2] + f, lost[3] + c
+    forces = (normal * nx + shear * ny, normal * ny - shear * nx, shear)
+    return forces, (lost[0] + n, lost[1] + s, lost[2] + f, lost[3] + c)
 
 
 @kernel()
 def pair_forces(rows, pairs, begin, end, law, losses):
     """Forces of the pairs begin..end-1 of discs on their grains; rows, memory and losses (4,) change in place.
 
-    losses: twice the energies of contact_losses, in units of kn. The geometry of a group of pairs is worked out while the
-    law of the group before is: both wait long for their own results, so they run in each other's shade.
+    losses: twice the energies of contact_losses, in units of kn. Three groups of pairs are under way at once, one at each
+    station: each waits long for its own root, division and sums, and so they run in each other's shade.
     """
     if begin == end:
         return
     zero = spread(0.0)
     lost = (zero, zero, zero, zero)
-    behind = disc_geometry(rows, pairs, begin)
-    for k in range(begin + WIDTH, end, WIDTH):
-        ahead = disc_geometry(rows, pairs, k)
-        lost = pair_law(rows, pairs, k - WIDTH, behind, law, lost)
-        behind = ahead
-    lost = pair_law(rows, pairs, end - WIDTH, behind, law, lost)
+    forces = (zero, zero, zero)
+    coming = _approach(rows, pairs, begin)
+    done = begin
+    for k in range(begin, end - WIDTH, WIDTH):
+        later = _approach(rows, pairs, k + WIDTH)
+        there, lost = _contact(pairs, k, coming, law, lost)
+        scatter_action(rows, pairs.first, pairs.second, done, FX, *forces)
+        coming, forces, done = later, there, k
+    there, lost = _contact(pairs, end - WIDTH, coming, law, lost)
+    scatter_action(rows, pairs.first, pairs.second, done, FX, *forces)
+    scatter_action(rows, pairs.first, pairs.second, end - WIDTH, FX, *there)
     for m in range(4):
         a, b, c, d = unpack(lost[m])
         losses[m] += a + b + c + d

@@ -243,32 +243,32 @@ def _chunks(context: Any, builder: Any, sig: Any, args: Any) -> tuple[Any, list[
     return data, first, second
 
 
+def _gathering(operation: str, columns: int) -> Any:
+    def typed(_typing: Any, rows: Any, first: Any, second: Any, _k: Any, _column: Any) -> Any:
+        def emit(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+            data, i, j = _chunks(context, builder, sig, args)
+            combine = getattr(builder, operation)
+            parts = [
+                combine(_read(builder, data, to), _read(builder, data, of), flags=_FLAGS)
+                for of, to in zip(i, j, strict=True)
+            ]
+            return context.make_tuple(builder, sig.return_type, _transpose(builder, parts, columns))
+
+        return types.UniTuple(lanes, columns)(rows, first, second, types.intp, types.intp), emit
+
+    return typed
+
+
 @intrinsic
-def gather_difference(_typing, rows, first, second, k, column):
+def gather_difference(typing, rows, first, second, k, column):
     """Four columns from `column` on of second's rows less first's, for the pairs k..k+3 of two int32 lists of offsets."""
-
-    def emit(context, builder, sig, args):
-        data, i, j = _chunks(context, builder, sig, args)
-        parts = [
-            builder.fsub(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)
-        ]
-        return context.make_tuple(builder, sig.return_type, _transpose(builder, parts))
-
-    return types.UniTuple(lanes, 4)(rows, first, second, types.intp, types.intp), emit
+    return _gathering("fsub", 4)(typing, rows, first, second, k, column)
 
 
 @intrinsic
-def gather_sum(_typing, rows, first, second, k, column):
+def gather_sum(typing, rows, first, second, k, column):
     """Two columns from `column` on of second's rows plus first's, for the pairs k..k+3 of two int32 lists of offsets."""
-
-    def emit(context, builder, sig, args):
-        data, i, j = _chunks(context, builder, sig, args)
-        parts = [
-            builder.fadd(_read(builder, data, j[m]), _read(builder, data, i[m]), flags=_FLAGS) for m in range(WIDTH)
-        ]
-        return context.make_tuple(builder, sig.return_type, _transpose(builder, parts, 2))
-
-    return types.UniTuple(lanes, 2)(rows, first, second, types.intp, types.intp), emit
+    return _gathering("fadd", 2)(typing, rows, first, second, k, column)
 
 
 @intrinsic

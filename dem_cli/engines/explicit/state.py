@@ -168,27 +168,23 @@ class ExplicitState:
     def grains(self) -> Grains:
         """The grains in the order of their ids."""
         n = len(self.mass)
-        rows = np.empty((n, ROW))
-        rows[self.order] = self.rows[:n]
-        velocity = np.empty((n, 3))
-        velocity[self.order] = self.velocity if self.integrator == THESIS else self.rows[:n, U:R]
-        mass, radius = np.empty(n), rows[:, R].copy()
-        mass[self.order] = self.mass
-        escaped = np.empty(n, dtype=bool)
-        escaped[self.order] = ~self.alive
-        velocity[escaped] = 0.0
+        row = np.empty(n, dtype=np.int64)
+        row[self.order] = np.arange(n)
+        speed = self.velocity if self.integrator == THESIS else self.rows[:n, U:R]
+        u, v, q = (np.where(self.alive, column, 0.0)[row] / self.dt for column in speed.T)
+        mass, radius = self.mass[row], self.radius[row]
         return Grains(
             id=np.arange(n, dtype=np.int64),
-            x=rows[:, X].copy(),
-            y=rows[:, Y].copy(),
-            angle=rows[:, ARC] / radius,
-            vx=velocity[:, 0] / self.dt,
-            vy=velocity[:, 1] / self.dt,
-            spin=velocity[:, 2] / self.dt / radius,
+            x=self.rows[row, X],
+            y=self.rows[row, Y],
+            angle=self.rows[row, ARC] / radius,
+            vx=u,
+            vy=v,
+            spin=q / radius,
             radius=radius,
             mass=mass,
             inertia=mass * radius**2 / DISC_INERTIA,
-            escaped=escaped,
+            escaped=~self.alive[row],
         )
 
     def contacts(self) -> Contacts:

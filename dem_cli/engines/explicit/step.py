@@ -61,9 +61,10 @@ class Box(NamedTuple):
 
 @kernel()
 def move(rows, begin, end, kick, fx, fy):
-    """Leapfrog of the grains begin..end-1 without extra damping: velocities by `kick` steps of force, positions by one step; forces are set to zero.
+    """Leapfrog of the grains begin..end-1 without extra damping: velocities by `kick` steps of force, positions by one step.
 
-    fx, fy: acceleration of the body force times dt^2 [m]. Grains without mobility stay. Returns the largest squared displacement [m^2].
+    fx, fy: acceleration of the body force times dt^2 [m]. Forces are set to zero; grains without mobility stay.
+    Returns the largest squared displacement [m^2].
     """
     body, most = pack(0.0, 0.0, fx, fy), spread(0.0)
     for i in range(begin, end):

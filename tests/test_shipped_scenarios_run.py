@@ -1,0 +1,76 @@
+"""The scenarios that come along, run: the quick one as it is, the large ones with fewer grains and less time but the same physics."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dem_cli.results import Results, open_results
+from dem_cli.run import run_scenario
+from dem_cli.scenario import Shake, load_scenario
+from dem_cli.scenario.shipped import folder
+
+# A tenth of the grains, in a box of a third of the width.
+SMALLER = ("grains.count=300", "packing.grid.columns=13", "container.width=40.5 cm", "output.tracks.grains=[0, 150, 299]")
+SHORTER = {
+    "shake-quick": (),
+    "thesis-discs-400gal-10hz": (*SMALLER, "stage.shake.duration=0.5 s"),
+    "thesis-discs-1200gal-1hz": (*SMALLER, "stage.shake.duration=1 s"),
+}
+
+
+@pytest.fixture(scope="module", params=SHORTER)
+def results(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
+    scenario = load_scenario(folder() / f"{request.param}.toml", SHORTER[request.param])
+    with open_results(run_scenario(scenario, tmp_path_factory.mktemp("shipped") / "run.h5")) as opened:
+        yield opened
+
+
+def test_each_has_a_shorter_form() -> None:
+    assert {path.stem for path in folder().glob("*.toml")} == SHORTER.keys()
+
+
+def test_ends_well(results: Results) -> None:
+    assert results.complete
+    assert results.warnings == []
+    for stage in results.stages:
+        assert stage.reason.startswith("at rest" if stage.kind == "settle" else "its time was over")
+
+
+def test_ledger_closes(results: Results) -> None:
+    """The residual stays below 1e-3 of the energy put in, at the end and everywhere."""
+    residual, put_in = results.series["residual"], results.series["energy_in"]
+    assert abs(residual[-1]) < 1e-3 * put_in[-1]
+    begun = put_in > 0.0
+    assert np.count_nonzero(begun) >= len(put_in) - 1
+    assert np.max(np.abs(residual[begun]) / put_in[begun]) < 1e-3
+    assert np.count_nonzero(residual) > 0
+
+
+def test_packs_and_densifies(results: Results) -> None:
+    """What the thesis sees: falling leaves a dense sample, shaking does not loosen it at 400 gal; none is lost."""
+    packing, shaking = results.stages[0], results.stages[1]
+    assert 0.17 < packing.after["void_ratio_inner"] < 0.26
+    assert 2.5 < packing.after["coordination"] < 4.2
+    assert results.series["escaped"].max() == 0.0
+    assert results.series["max_overlap"].max() < 0.05
+    shake = next(s for s in load_scenario_of(results).stages if isinstance(s, Shake))
+    if shake.amplitude < 5.0:
+        assert shaking.after["void_ratio"] < packing.after["void_ratio"]
+    else:
+        moved = results.frame(-1).grains.x - frame_at(results, packing.end).grains.x
+        assert np.abs(moved).max() > 0.02
+    assert shaking.after["work"] > 0.0
+
+
+def load_scenario_of(results: Results):  # type: ignore[no-untyped-def]
+    from dem_cli.scenario import parse_scenario
+
+    return parse_scenario(str(results.attrs["resolved"]))
+
+
+def frame_at(results: Results, moment: float):  # type: ignore[no-untyped-def]
+    return results.frame(int(np.argmin(np.abs(results.frame_times - moment))))
