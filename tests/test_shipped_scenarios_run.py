@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dem_cli.results import Results, open_results
+from dem_cli.results import Results, StoredFrame, open_results
 from dem_cli.run import run_scenario
-from dem_cli.scenario import Shake, load_scenario
+from dem_cli.scenario import Shake, load_scenario, parse_scenario
 from dem_cli.scenario.shipped import folder
 
 # A tenth of the grains, in a box of a third of the width.
-SMALLER = ("grains.count=300", "packing.grid.columns=13", "container.width=40.5 cm", "output.tracks.grains=[0, 150, 299]")
+SMALLER = (
+    "grains.count=300",
+    "packing.grid.columns=13",
+    "container.width=40.5 cm",
+    "output.tracks.grains=[0, 150, 299]",
+)
 SHORTER = {
     "shake-quick": (),
     "thesis-discs-400gal-10hz": (*SMALLER, "stage.shake.duration=0.5 s"),
@@ -57,7 +61,7 @@ def test_packs_and_densifies(results: Results) -> None:
     assert 2.5 < packing.after["coordination"] < 4.2
     assert results.series["escaped"].max() == 0.0
     assert results.series["max_overlap"].max() < 0.05
-    shake = next(s for s in load_scenario_of(results).stages if isinstance(s, Shake))
+    shake = next(s for s in parse_scenario(str(results.attrs["resolved"])).stages if isinstance(s, Shake))
     if shake.amplitude < 5.0:
         assert shaking.after["void_ratio"] < packing.after["void_ratio"]
     else:
@@ -66,11 +70,5 @@ def test_packs_and_densifies(results: Results) -> None:
     assert shaking.after["work"] > 0.0
 
 
-def load_scenario_of(results: Results):  # type: ignore[no-untyped-def]
-    from dem_cli.scenario import parse_scenario
-
-    return parse_scenario(str(results.attrs["resolved"]))
-
-
-def frame_at(results: Results, moment: float):  # type: ignore[no-untyped-def]
+def frame_at(results: Results, moment: float) -> StoredFrame:
     return results.frame(int(np.argmin(np.abs(results.frame_times - moment))))

@@ -188,14 +188,8 @@ def test_limit_of_the_time_step_is_sharp(h, ks):
     assert loud > 100.0
 
 
-UNDERRATED = pytest.mark.xfail(reason="critical_time_step underrates the dashpots of ks by sqrt(kn/ks)")
-
-
-@pytest.mark.parametrize(
-    ("ratio", "h"),
-    [(1.0, 0.0), (1.0, 0.3), (1.0, 1.0), (0.5, 0.0), (1.0 / 3.0, 0.0)]
-    + [pytest.param(ratio, h, marks=UNDERRATED) for ratio in (0.5, 1.0 / 3.0) for h in (0.1, 0.3, 1.0)],
-)
+@pytest.mark.parametrize("h", [0.0, 0.1, 0.3, 1.0])
+@pytest.mark.parametrize("ratio", [1.0, 0.5, 1.0 / 3.0])
 def test_engine_stays_below_the_limit_of_a_lattice(ratio, h):
     found = critical_time_step(KN, ratio * KN, MASS, h, h)
     assert 0.8 * lattice_limit(ratio * KN, h) < found < 1.001 * lattice_limit(ratio * KN, h)

@@ -22,7 +22,9 @@ def check_contacts(frame: Frame, scenario: Scenario) -> int:
     """The frame's contacts are those of all pairs, with their overlap; number of them."""
     contacts = frame.contacts
     assert contacts is not None
-    found = dict(zip(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True), contacts.overlap.tolist(), strict=True))
+    found = dict(
+        zip(zip(contacts.i.tolist(), contacts.j.tolist(), strict=True), contacts.overlap.tolist(), strict=True)
+    )
     assert len(found) == len(contacts)
     assert list(found) == sorted(found)
     wanted = all_pairs(frame.grains) | all_wall_contacts(frame.grains, scenario)

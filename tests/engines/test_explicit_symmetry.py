@@ -72,9 +72,7 @@ LAWS: dict[str, dict[str, Any]] = {
     "usual": {},
     "thesis": {"contact.tension": "damping", "contact.slider": "spring", "integration.integrator": "thesis"},
     "extra damping": {
-        "stage": [
-            {"kind": "settle", "limit": "0.15 s", "unbalanced": 1e-12, "damping": {"mass": "3 1/s"}}
-        ]
+        "stage": [{"kind": "settle", "limit": "0.15 s", "unbalanced": 1e-12, "damping": {"mass": "3 1/s"}}]
     },
 }
 

@@ -75,12 +75,12 @@ class SineShaking:
 
     def motion(self, time: float) -> Floats:
         """(3, 2), by the trapezoidal rule on SAMPLES_PER_CYCLE points a cycle."""
-        cycle = 1.0 / self.frequency
-        end = max(self.duration, cycle)
-        grid = np.linspace(0.0, end, int(np.ceil(end / cycle * SAMPLES_PER_CYCLE)) + 1)
+        step = 1.0 / self.frequency / SAMPLES_PER_CYCLE
+        grid = step * np.arange(max(math.ceil(self.duration / step), SAMPLES_PER_CYCLE) + 1)
         velocity = _integral(grid, self._scalar(grid))
-        middle = (grid >= 0.5 * (end - cycle)) & (grid <= 0.5 * (end + cycle))
-        velocity = velocity - velocity[middle].mean()
+        middle = (len(grid) - 1 - SAMPLES_PER_CYCLE) // 2  # a whole cycle, where the ramps are over
+        cycle = velocity[middle : middle + SAMPLES_PER_CYCLE + 1]
+        velocity = velocity - 0.5 * (cycle[1:] + cycle[:-1]).mean()
         place = _integral(grid, velocity)
         now = (np.interp(time, grid, place), np.interp(time, grid, velocity), self._scalar(np.array([time]))[0])
         return np.array(now)[:, None] * self.direction

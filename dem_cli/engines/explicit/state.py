@@ -112,9 +112,10 @@ class ExplicitState:
         return int(status), int(i), int(j)
 
     def first_forces(self) -> None:
-        """Forces of the contacts that exist before the first step."""
+        """Forces of the contacts that exist before the first step; their tangential springs begin unstretched."""
+        law = self.law._replace(stiffness_ratio=0.0)
         self.lists = step.evaluate(
-            self.rows.reshape(-1), self.radius, self.alive, self.lists, self.walls, self.law, self.skin
+            self.rows.reshape(-1), self.radius, self.alive, self.lists, self.walls, law, self.skin
         )
         self.travelled[0] = 0.0
 

@@ -149,15 +149,17 @@ def _work(rows, mass, motion, s, ledger):
 
 
 @kernel()
-def _let_go(rows, mass, radius, alive, box, field, kn, ledger):
+def _let_go(rows, mass, radius, alive, box, gravity, dt, kn, ledger):
     """Take grains that have left the box out of the motion: they stay where they are, and their energy goes to ESCAPED."""
     for i in range(radius.size):
         a = ROW * i
         x, y = rows[a + X], rows[a + Y]
         if alive[i] and (x < box.left - radius[i] or x > box.right + radius[i] or y < box.bottom - radius[i]):
             alive[i] = False
-            swing = rows[a + U] ** 2 + rows[a + V] ** 2 + rows[a + Q] ** 2 / DISC_INERTIA
-            ledger[ESCAPED] += 0.5 * kn / rows[a + MOBILITY] * swing - mass[i] * (field[0] * x + field[1] * y)
+            # Half a kick brings the velocity to the instant of the position.
+            u, v = rows[a + U] + 0.5 * dt * dt * gravity[0], rows[a + V] + 0.5 * dt * dt * gravity[1]
+            swing = u**2 + v**2 + rows[a + Q] ** 2 / DISC_INERTIA
+            ledger[ESCAPED] += 0.5 * kn / rows[a + MOBILITY] * swing - mass[i] * (gravity[0] * x + gravity[1] * y)
             rows[a + U] = rows[a + V] = rows[a + Q] = rows[a + MOBILITY] = 0.0
 
 
@@ -219,7 +221,7 @@ def advance(
                 remember(pairs, lists.memory)
                 remember(touching, lists.wall_memory)
             if 2.0 * travelled[0] > skin:
-                _let_go(rows, mass, radius, alive, box, gravity, kn, ledger)
+                _let_go(rows, mass, radius, alive, box, gravity, dt, kn, ledger)
                 x, y = rows[X : ROW * n : ROW].copy(), rows[Y : ROW * n : ROW].copy()
                 lists = outer_lists(x, y, radius, alive, walls, skin, lists)
                 travelled[0] = 0.0
