@@ -46,7 +46,9 @@ def test_notebook_example_runs(tmp_path, monkeypatch):
     example = re.search(r"In a notebook:\n\n```python\n(.*?)```", README, re.DOTALL)
     assert example
     short = SHIPPED.joinpath("shake-quick.toml").read_text()
-    short = short.replace('duration  = "1 s"', 'duration  = "0.02 s"').replace('kind = "settle"', 'kind = "settle"\nlimit = "0.05 s"')
+    short = short.replace('duration  = "1 s"', 'duration  = "0.02 s"').replace(
+        'kind = "settle"', 'kind = "settle"\nlimit = "0.05 s"'
+    )
     (tmp_path / "mine.toml").write_text(short)
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}

@@ -98,7 +98,10 @@ ONE_LINE: list[tuple[dict[str, Any], list[str]]] = [
         {"stage.1.cycles": 5},
         ["[[stage]] 2 (shake) cycles = 5: contradicts duration. Give only one of: duration or cycles"],
     ),
-    ({"stage.1.ramp": "2.1 s"}, ['[[stage]] 2 (shake) ramp = "2.1 s": is longer than half of the stage, which takes 2 s']),
+    (
+        {"stage.1.ramp": "2.1 s"},
+        ['[[stage]] 2 (shake) ramp = "2.1 s": is longer than half of the stage, which takes 2 s'],
+    ),
     ({"material.normal_stiffness": "1 N/m"}, ["[material] normal_stiffness", "contradicts s_wave_velocity"]),
     ({"packing.file": "a.csv"}, ["[packing] file", "contradicts grid"]),
     ({"packing.method": "file"}, ['[packing] grid = { columns = 8, spacing = "3 cm" }: contradicts method = "file"']),

@@ -78,7 +78,7 @@ def test_ground_moves_as_a_table(angle):
         np.testing.assert_allclose(motion[:, k], wanted[:, None] * direction, rtol=0, atol=1e-3 * scale)
 
 
-@pytest.mark.parametrize(("duration", "ramp"), [(1.0, 0.0), (1.0, 0.25), (1.03, 0.31), (0.5, 0.25), (2.0, 0.01)])
+@pytest.mark.parametrize(("duration", "ramp"), [(1.0, 0.0), (1.0, 0.25), (1.03, 0.31), (0.5, 0.2), (2.0, 0.01)])
 def test_ground_stays_in_place(duration, ramp):
     ground = shaking(duration, ramp)
     time = np.linspace(0.0, duration, 2001)

@@ -45,7 +45,7 @@ class Still:
 class SineShaking:
     """Ground acceleration A r(t) sin(2 pi f t) along a direction; r rises from 0 to 1 over the ramp and falls so at the end.
 
-    The velocity at the start is the one that leaves no lasting drift (-A/(2 pi f) without ramp): the grains, seen from the container, do not
+    The velocity at the start is the one that leaves no drift over a cycle between the ramps (-A/(2 pi f) without ramp): the grains, seen from the container, do not
     know the difference, and the displacement of the ground stays bounded as that of a shaking table.
     """
 
@@ -76,7 +76,7 @@ class SineShaking:
     def motion(self, time: float) -> Floats:
         """(3, 2), by the trapezoidal rule on SAMPLES_PER_CYCLE points a cycle."""
         step = 1.0 / self.frequency / SAMPLES_PER_CYCLE
-        grid = step * np.arange(max(math.ceil(self.duration / step), SAMPLES_PER_CYCLE) + 1)
+        grid: Floats = np.arange(max(math.ceil(self.duration / step), SAMPLES_PER_CYCLE) + 1, dtype=np.float64) * step
         velocity = _integral(grid, self._scalar(grid))
         middle = (len(grid) - 1 - SAMPLES_PER_CYCLE) // 2  # a whole cycle, where the ramps are over
         cycle = velocity[middle : middle + SAMPLES_PER_CYCLE + 1]
