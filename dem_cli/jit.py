@@ -19,7 +19,7 @@ import numba
 
 def _cache_folder() -> Path:
     package = Path(__file__).parent
-    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]}".encode())
+    digest = hashlib.sha256(f"{numba.__version__} {sys.version_info[:2]} {package}".encode())
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
         if b"jit import kernel" in text or source == Path(__file__):

@@ -13,6 +13,7 @@ from dem_cli.analysis.void_ratio import WindowMargins
 from dem_cli.assembly import build_assembly
 from dem_cli.engines.explicit.engine import ExplicitEngine
 from dem_cli.errors import RunError
+from dem_cli.interrupts import marked_interrupts
 from dem_cli.results import ResultWriter
 from dem_cli.scenario import Scenario
 from dem_cli.state import Frame
@@ -31,7 +32,7 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
     engine = ExplicitEngine(scenario, assembly)
     output, container = scenario.output, scenario.container
     surface_x = bin_centers(container.width, output.surface_bins)
-    with ResultWriter(
+    with marked_interrupts() as engine.check, ResultWriter(
         target, scenario_text=scenario.source, resolved_toml=scenario.resolved_toml(), scenario_hash=scenario.hash,
         seed=scenario.seed, engine=scenario.engine, title=scenario.title, grains=assembly.grains, walls=assembly.walls,
         depth=scenario.depth, container={"width": container.width, "height": container.height},
@@ -45,6 +46,7 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
                 write(writer, scenario, frame, measures, row)
                 if listener:
                     listener(frame, row if measures else None)
+                engine.check()
                 del frame, measures  # large; the next ones are made before these names are bound again
         except RunError as error:
             writer.warn(str(error))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from pathlib import Path
@@ -38,7 +37,6 @@ def command(
     from dem_cli.jit import is_cold
     from dem_cli.run import run_scenario
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     began = time.monotonic()
     with Progress(loaded, settings.verbosity) as progress:
         progress.say(f"{loaded.title}: {loaded.grain_count} grains, {len(loaded.stages)} stages, to {target}")

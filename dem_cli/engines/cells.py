@@ -24,7 +24,7 @@ def order_by_columns(x, y, cell):
 
 @kernel()
 def _cell_grid(x, y, alive, cell):
-    """Counting sort of the living grains into cells: (cell of grain, start of cell, grains by cell, rows)."""
+    """Counting sort of the living grains, whose places must be finite, into cells: (cell of grain, start of cell, grains by cell, rows)."""
     n = x.size
     left, right, bottom, top = np.inf, -np.inf, np.inf, -np.inf
     for i in range(n):
@@ -41,8 +41,8 @@ def _cell_grid(x, y, alive, cell):
     start = np.zeros(columns * rows + 1, np.int64)
     for i in range(n):
         if alive[i]:
-            column = min(int((x[i] - left) / cell), columns - 1)
-            row = min(int((y[i] - bottom) / cell), rows - 1)
+            column = int(min((x[i] - left) / cell, columns - 1.0))
+            row = int(min((y[i] - bottom) / cell, rows - 1.0))
             where[i] = column * rows + row
             start[where[i] + 1] += 1
     for c in range(columns * rows):
@@ -60,7 +60,7 @@ def _cell_grid(x, y, alive, cell):
 def neighbour_list(x, y, radius, alive, skin):
     """Half neighbour list of discs from a cell grid.
 
-    x, y, radius: (n,) [m]; alive: (n,) bool, grains that are left out are False; skin [m] > 0.
+    x, y, radius: (n,) [m], finite; alive: (n,) bool, grains that are left out are False; skin [m] > 0.
     Returns start (n + 1,) int64, neighbour (pairs,) int32, ascending in i; within i in the order of the cells.
     """
     n = x.size

@@ -54,9 +54,9 @@ class Watch:
         if last is None or frame.energy_in <= 0.0:
             return
         now, (before, contacts) = frame.energy, last
-        for name in ("kinetic", "elastic_normal", "friction", "dashpot_normal", "dashpot_tangential"):
-            if not math.isfinite(getattr(now, name)):
-                raise RunError(f"t = {frame.time:.6g} s: the energy is no longer a number{_remedy(time_step)}")
+        for name, value in vars(now).items():
+            if not math.isfinite(value):
+                raise RunError(f"t = {frame.time:.6g} s: the energy ({name}) is no longer a number{_remedy(time_step)}")
         given = (now.work - before.work) - (now.stored - before.stored) - (now.escaped - before.escaped)
         unstable = scenario.integration.integrator == "leapfrog" and -given > GAIN * frame.energy_in
         for name in ("friction", "dashpot_normal", "dashpot_tangential"):

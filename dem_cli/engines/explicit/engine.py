@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -36,6 +36,7 @@ class ExplicitEngine:
         self.stage_started = 0.0
         self._ground_place = np.zeros(2)
         self._watch = Watch()
+        self.check: Callable[[], None] = lambda: None  # called about every second of work; may raise KeyboardInterrupt
 
     def frames(self) -> Iterator[Frame]:
         """Frames that are due, stage after stage. RunError if the run blows up."""
@@ -67,6 +68,10 @@ class ExplicitEngine:
                     if isinstance(stage, Settle)
                     else "its time was over"
                 )
+                if isinstance(stage, Settle) and not at_rest and self._jitters(stage, frame):
+                    reason += (
+                        ". Forces jump though nothing moves: the time step is unstable here, lower [integration] safety"
+                    )
                 warnings = () if at_rest or not isinstance(stage, Settle) else (f"stage {stage.name}: {reason}",)
                 frame = self._frame(ground, everything)
                 yield replace(frame, stage_end=True, stop_reason=reason, warnings=warnings)
@@ -89,6 +94,7 @@ class ExplicitEngine:
                 dt, self.gravity + driving, driving if ground.moves else np.zeros((0, 2)), damping
             )
             done += now
+            self.check()
             if status != FINE:
                 raise blown_up(self.scenario, self.state, status, i, j, self.time_step)
         self.state.time = moment
@@ -121,6 +127,9 @@ class ExplicitEngine:
         if kinetic < stage.kinetic and quiet and not still_falling:
             return f"at rest: {self._restlessness(frame)}"
         return ""
+
+    def _jitters(self, stage: Settle, frame: Frame) -> bool:
+        return frame.unbalanced > 10.0 * stage.unbalanced and self._kinetic_per_grain(frame) < stage.kinetic
 
     def _restlessness(self, frame: Frame) -> str:
         return (

@@ -86,6 +86,16 @@ def _recall(pairs, n, memory, k):
 
 
 @kernel()
+def not_finite(rows, n):
+    """The first of n grains whose place or spin is not a finite number, or -1: lists of such grains would lead out of memory."""
+    for i in range(n):
+        a = ROW * i
+        if not (abs(rows[a + X]) < np.inf and abs(rows[a + Y]) < np.inf and abs(rows[a + Q]) < np.inf):
+            return i
+    return -1
+
+
+@kernel()
 def inner_pairs(rows, lists, skin, deepest):
     """Pairs of grains closer than `skin` [m], with their memory; a pair of far dummies fills up each chunk.
 
@@ -98,8 +108,6 @@ def inner_pairs(rows, lists, skin, deepest):
     for i in range(n):
         a = ROW * i
         x, y, r, mobility = rows[a + X], rows[a + Y], rows[a + R], rows[a + MOBILITY]
-        if not (abs(x) < np.inf and abs(y) < np.inf and abs(rows[a + Q]) < np.inf):
-            status, bad_i = NOT_A_NUMBER, i
         for k in range(lists.start[i], lists.start[i + 1]):
             b = ROW * np.int64(lists.neighbour[k])
             dx, dy, reach = rows[b + X] - x, rows[b + Y] - y, r + rows[b + R]

@@ -45,8 +45,8 @@ class Still:
 class SineShaking:
     """Ground acceleration A r(t) sin(2 pi f t) along a direction; r rises from 0 to 1 over the ramp and falls so at the end.
 
-    The velocity at the start is the one that leaves no drift over a cycle between the ramps (-A/(2 pi f) without ramp): the grains, seen from the container, do not
-    know the difference, and the displacement of the ground stays bounded as that of a shaking table.
+    The velocity at the start is the one that leaves no drift over a cycle between the ramps (-A/(2 pi f) without ramp): the
+    grains, seen from the container, do not know the difference, and the ground stays in place as on a shaking table.
     """
 
     amplitude: float

@@ -27,7 +27,15 @@ from dem_cli.engines.explicit.forces import (
     wall_forces,
 )
 from dem_cli.engines.explicit.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
-from dem_cli.engines.explicit.lists import FINE, inner_pairs, inner_walls, outer_lists, remember
+from dem_cli.engines.explicit.lists import (
+    FINE,
+    NOT_A_NUMBER,
+    inner_pairs,
+    inner_walls,
+    not_finite,
+    outer_lists,
+    remember,
+)
 from dem_cli.jit import kernel
 
 LEAPFROG, THESIS = 0, 1
@@ -220,6 +228,10 @@ def advance(
             if fresh:
                 remember(pairs, lists.memory)
                 remember(touching, lists.wall_memory)
+            i = not_finite(rows, n)
+            if i >= 0:
+                status = NOT_A_NUMBER
+                break
             if 2.0 * travelled[0] > skin:
                 _let_go(rows, mass, radius, alive, box, gravity, dt, kn, ledger)
                 x, y = rows[X : ROW * n : ROW].copy(), rows[Y : ROW * n : ROW].copy()
