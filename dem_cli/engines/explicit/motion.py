@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -73,15 +74,20 @@ class SineShaking:
         """(t, 2) [m/s^2]."""
         return self._scalar(time)[:, None] * self.direction
 
-    def motion(self, time: float) -> Floats:
-        """(3, 2), by the trapezoidal rule on SAMPLES_PER_CYCLE points a cycle."""
+    @cached_property
+    def _table(self) -> tuple[Floats, Floats, Floats]:
+        """Times, displacements and velocities by the trapezoidal rule on SAMPLES_PER_CYCLE points a cycle."""
         step = 1.0 / self.frequency / SAMPLES_PER_CYCLE
         grid: Floats = np.arange(max(math.ceil(self.duration / step), SAMPLES_PER_CYCLE) + 1, dtype=np.float64) * step
         velocity = _integral(grid, self._scalar(grid))
         middle = (len(grid) - 1 - SAMPLES_PER_CYCLE) // 2  # a whole cycle, where the ramps are over
         cycle = velocity[middle : middle + SAMPLES_PER_CYCLE + 1]
         velocity = velocity - 0.5 * (cycle[1:] + cycle[:-1]).mean()
-        place = _integral(grid, velocity)
+        return grid, _integral(grid, velocity), velocity
+
+    def motion(self, time: float) -> Floats:
+        """(3, 2) at a time [s] of the stage."""
+        grid, place, velocity = self._table
         now = (np.interp(time, grid, place), np.interp(time, grid, velocity), self._scalar(np.array([time]))[0])
         return np.array(now)[:, None] * self.direction
 
