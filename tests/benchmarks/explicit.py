@@ -22,7 +22,7 @@ import numpy as np
 
 HERE = Path(__file__).parent
 WIDTH = 1.215
-STEPS = {1: 40_000, 10: 5_000, 100: 2_000}
+STEPS = {1: 40_000, 10: 5_000, 100: 3_000}
 SCENARIO = """
 title = "benchmark"
 engine = "explicit"
@@ -57,7 +57,11 @@ def measure(copies: int, steps: int) -> dict[str, float]:
             listener=lambda frame, _row: marks.append((frame.step, time.process_time())),
         )
         peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return {"grains": 3000 * copies, "steps": marks[-1][0], "seconds": marks[-1][1] - marks[0][1], "memory": peak}
+        (first, began), (last, ended) = (
+            marks[1],
+            marks[-1],
+        )  # before the first output compiled code is read from the cache
+        return {"grains": 3000 * copies, "steps": last - first, "seconds": ended - began, "memory": peak}
 
 
 def main() -> None:
