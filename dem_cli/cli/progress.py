@@ -58,8 +58,9 @@ class Progress:
         self._row = row or self._row
         if frame.stage_start:
             self._stage_began = frame.time
-        self._marks.append((time.monotonic(), frame.step))
-        while self._marks[-1][0] - self._marks[0][0] > SPEED_OVER and len(self._marks) > 2:
+        if frame.step > 0:  # compiling is over
+            self._marks.append((time.monotonic(), frame.step))
+        while len(self._marks) > 2 and self._marks[-1][0] - self._marks[0][0] > SPEED_OVER:
             self._marks.popleft()
         for warning in frame.warnings:
             self.say(f"warning: {warning}")
