@@ -41,7 +41,7 @@ def command(
     with Progress(loaded, settings.verbosity) as progress:
         progress.say(f"{loaded.title}: {loaded.grain_count} grains, {len(loaded.stages)} stages, to {target}")
         if is_cold():
-            progress.say("compiling the kernels, once after installation: about half a minute")
+            progress.say("compiling the kernels, once after installation: up to a minute")
         try:
             run_scenario(loaded, target, force=force, listener=progress)
         except KeyboardInterrupt:
