@@ -18,10 +18,16 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Grains:
-    """Grains in the order of their `id`, shape (n,) each.
+    """Elements (discs and ellipses) that grains are made of, in the order of their `id`, shape (n,) each.
 
-    id [-], x y [m], angle [rad], vx vy [m/s], spin [rad/s], radius [m], mass [kg], inertia [kg m^2] (2D: of the
-    cylinder of the scenario's depth), escaped (True once a grain has left the container; it is kept, at rest).
+    A grain is one element, or several that are bonded or rigid together: `body` is the number of the grain that an element belongs
+    to; it counts from 0 and never falls from one element to the next. An element moves as the disc or ellipse that it is, so
+    momentum, energy and centre of mass of a grain are sums over its elements, whatever holds them together: those of
+    a rigid clump carry masses and inertias that add up to the clump's own.
+
+    id [-], x y [m], angle [rad] of the semi-axis a, anticlockwise from +x, vx vy [m/s], spin [rad/s], radius [m] of the disc of equal area
+    sqrt(a b), mass [kg], inertia [kg m^2] (2D: of the cylinder of the scenario's depth), escaped (True once a grain has left the container;
+    it is kept, at rest), a b [m]: semi-axes, a >= b, equal for discs, body [-].
     """
 
     id: Ints
@@ -35,33 +41,87 @@ class Grains:
     mass: Floats
     inertia: Floats
     escaped: Bools
+    a: Floats
+    b: Floats
+    body: Ints
 
     def __len__(self) -> int:
         return len(self.id)
 
     @classmethod
     def discs(cls, x: Floats, y: Floats, radius: Floats, density: float, depth: float) -> Grains:
-        """Discs at rest: mass rho pi r^2 L, inertia m r^2 / 2 (physics.md 0)."""
+        """Discs at rest, each a grain: mass rho pi r^2 L, inertia m r^2 / 2 (physics.md 0)."""
+        return cls.ellipses(x, y, radius, radius, np.zeros(len(x)), density, depth)
+
+    @classmethod
+    def ellipses(
+        cls, x: Floats, y: Floats, a: Floats, b: Floats, angle: Floats, density: float, depth: float
+    ) -> Grains:
+        """Ellipses at rest, each a grain: mass rho pi a b L, inertia m (a^2 + b^2) / 4 (thesis (4.54))."""
         n = len(x)
-        mass = density * np.pi * radius**2 * depth
-        zero = np.zeros(n)
+        a, b = np.array(a, dtype=float), np.array(b, dtype=float)
+        mass = density * np.pi * a * b * depth
         return cls(
             id=np.arange(n, dtype=np.int64),
             x=np.array(x, dtype=float),
             y=np.array(y, dtype=float),
-            angle=zero.copy(),
-            vx=zero.copy(),
-            vy=zero.copy(),
-            spin=zero.copy(),
-            radius=np.array(radius, dtype=float),
+            angle=np.array(angle, dtype=float),
+            vx=np.zeros(n),
+            vy=np.zeros(n),
+            spin=np.zeros(n),
+            radius=np.where(a == b, a, np.sqrt(a * b)),
             mass=mass,
-            inertia=0.5 * mass * radius**2,
+            inertia=0.25 * mass * (a**2 + b**2),
             escaped=np.zeros(n, dtype=bool),
+            a=a,
+            b=b,
+            body=np.arange(n, dtype=np.int64),
         )
+
+    @property
+    def grain_count(self) -> int:
+        """Number of grains, each of one or more elements."""
+        return int(self.body[-1]) + 1 if len(self) else 0
 
     def take(self, index: Ints | Bools) -> Grains:
         """The grains at `index`, copied."""
         return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+
+@dataclass(frozen=True)
+class Bonds:
+    """Dashpots that hold elements of a grain together (thesis ch. 5; physics.md 1.4), shape (b,) each.
+
+    i j [-]: indices of the elements, i < j of the same grain; normal and tangential viscosity Cn, Cs [N s/m], rolling [N m s]:
+    viscosity against turning of one element against the other, 0 where they may roll on each other.
+    """
+
+    i: Ints
+    j: Ints
+    normal: Floats
+    tangential: Floats
+    rolling: Floats
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+    @classmethod
+    def none(cls) -> Bonds:
+        """No bond."""
+        empty, numbers = np.empty(0, dtype=np.int64), np.empty(0)
+        return cls(empty, empty, numbers, numbers, numbers)
+
+
+@dataclass(frozen=True)
+class BondStrain:
+    """What the bonds have given since the start of the run, shape (b,) each, as in `Bonds`.
+
+    gap [m]: centres further apart (+) or closer (-); slip [m]: sliding at the common point; roll [rad]: turn of j against i.
+    """
+
+    gap: Floats
+    slip: Floats
+    roll: Floats
 
 
 @dataclass(frozen=True)
@@ -81,9 +141,9 @@ class Walls:
 
 @dataclass(frozen=True)
 class Contacts:
-    """Contacts that touch (overlap > 0), shape (c,) each, sorted by (i, j).
+    """Contacts that touch (overlap > 0), shape (c,) each, sorted by (i, j); elements of one grain make none with each other.
 
-    i [-]: index of a grain. j [-]: index of the other grain, or -1 - w for wall w. nx ny [-]: unit normal from i to j.
+    i [-]: index of an element. j [-]: index of the other element, or -1 - w for wall w. nx ny [-]: unit normal from i to j.
     px py [m]: contact point. overlap [m]. normal [N]: compression > 0. shear [N]: force on j along t = (-ny, nx).
     stretch [m]: elastic tangential stretch, whose spring gives shear = -ks * stretch. sliding: friction limit reached.
     The force of i on j is normal*n + shear*t.
@@ -110,7 +170,7 @@ class Energy:
     """Ledger of energy in joules, all counted from the start of the run.
 
     Stored now: kinetic, potential (of gravity, zero at y = 0), elastic_normal, elastic_tangential.
-    Lost so far, each >= 0: friction, dashpot_normal, dashpot_tangential, damping (extra damping while settling),
+    Lost so far, each >= 0: friction, dashpot_normal, dashpot_tangential, bonds, damping (extra damping while settling),
     escaped (carried off by grains that left). `time_step`: gained (+) or lost (-) since a contact opens and closes within a
     step, known exactly from the overlaps on both sides. `work`: done on the grains by the shaking.
     """
@@ -122,6 +182,7 @@ class Energy:
     friction: float = 0.0
     dashpot_normal: float = 0.0
     dashpot_tangential: float = 0.0
+    bonds: float = 0.0
     damping: float = 0.0
     escaped: float = 0.0
     time_step: float = 0.0
@@ -133,7 +194,7 @@ class Energy:
 
     @property
     def lost(self) -> float:
-        return self.friction + self.dashpot_normal + self.dashpot_tangential + self.damping + self.escaped
+        return self.friction + self.dashpot_normal + self.dashpot_tangential + self.bonds + self.damping + self.escaped
 
 
 @dataclass(frozen=True)
@@ -142,8 +203,8 @@ class Frame:
 
     step [-], time [s], dt [s] (step in use), stage (0-based). ground: displacement (x, y) [m], velocity [m/s] and acceleration
     [m/s^2] of the container, shape (3, 2); the grains' own coordinates are those of the container.
-    contacts and forces (shape (n, 2), resultant of contacts and gravity on each grain [N]) belong to the same instant
-    as the positions; both are None in a frame that is due for tracks only.
+    contacts and forces (shape (n, 2), resultant of contacts and gravity on each element [N]) belong to the same instant
+    as the positions; both are None in a frame that is due for tracks only. bonds: None where there is no bond, or for tracks only.
     residual [J]: what the ledger cannot account for; energy_in [J]: what was put in so far (potential energy set free and
     positive work), the scale that the residual is judged by.
     due: which outputs this frame is for, a subset of {"series", "frames", "tracks"}; stage_start and stage_end mark the frames
@@ -162,6 +223,7 @@ class Frame:
     due: frozenset[str]
     contacts: Contacts | None = None
     forces: Floats | None = None
+    bonds: BondStrain | None = None
     unbalanced: float = float("nan")
     stage_start: bool = False
     stage_end: bool = False

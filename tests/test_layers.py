@@ -26,10 +26,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "units": {"errors"},
     "state": {"errors"},
     "scenario": BASE,
-    "assembly": STARTS,
-    "engines": STARTS | {"assembly", "jit"},
+    "geometry": {"jit"},
+    "assembly": STARTS | {"geometry", "jit"},
+    "engines": STARTS | {"assembly", "geometry", "jit"},
     "results": STARTS,
-    "analysis": {"errors", "state", "jit"},
+    "analysis": {"errors", "state", "geometry", "jit"},
     "report": BASE | {"results", "analysis", "state"},
     "interrupts": set(),
     "run": STARTS | {"assembly", "engines", "results", "analysis", "interrupts"},
@@ -39,7 +40,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__main__": {"cli"},
 }
 # A kernel takes arrays and numbers.
-KERNEL_FILES_MAY_IMPORT = {"engines": {"engines", "jit"}, "analysis": {"analysis", "jit", "state"}}
+KERNEL_FILES_MAY_IMPORT = {
+    "geometry": {"geometry", "jit"},
+    "engines": {"engines", "geometry", "jit"},
+    "analysis": {"analysis", "geometry", "jit", "state"},
+    "assembly": {"assembly", "geometry", "jit"},
+}
 KERNEL_FILES_MAY_IMPORT_FROM_OUTSIDE = {
     "__future__", "collections", "dataclasses", "llvmlite", "math", "numba", "numpy", "operator", "typing",
 }  # fmt: skip
@@ -135,8 +141,8 @@ def test_kernels_know_arrays_only(module: str) -> None:
 
 def test_kernel_files_are_found() -> None:
     """The test above looks at the files that it is meant for."""
-    explicit = {f"dem_cli.engines.explicit.{name}" for name in ("step", "forces", "law", "lists", "lanes", "observe")}
-    assert explicit | {"dem_cli.engines.cells"} <= set(KERNEL_MODULES)
+    explicit = {f"dem_cli.engines.explicit.{name}" for name in ("step", "forces", "law", "lists", "observe")}
+    assert explicit | {f"dem_cli.geometry.{name}" for name in ("cells", "ellipse", "lanes")} <= set(KERNEL_MODULES)
 
 
 @pytest.mark.parametrize("module", MODULES)

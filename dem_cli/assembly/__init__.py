@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from dem_cli.assembly.container import build_walls
 from dem_cli.assembly.packing import place_grains
 from dem_cli.scenario import Scenario
-from dem_cli.state import Grains, Walls
+from dem_cli.state import Bonds, Grains, Walls
 
 __all__ = ["Assembly", "build_assembly"]
 
 
 @dataclass(frozen=True)
 class Assembly:
-    """Grains and walls at the start of a run."""
+    """Grains and walls at the start of a run; bonds within grains; rigid: grains of several elements are rigid clumps."""
 
     grains: Grains
     walls: Walls
+    bonds: Bonds = field(default_factory=Bonds.none)
+    rigid: bool = False
 
 
 def build_assembly(scenario: Scenario) -> Assembly:

@@ -217,6 +217,9 @@ class Results:
             mass=data["mass"][:n],
             inertia=data["inertia"][:n],
             escaped=data["escaped"][rows].astype(bool),
+            a=data["radius"][:n],
+            b=data["radius"][:n],
+            body=np.arange(n, dtype=np.int64),
         )
         stress = np.stack([data["stress"][rows, column] for column in (0, 1, 3, 4)], axis=1).astype(np.float64)
         return grains, data["coordination"][rows].astype(np.int64), stress

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dem_cli.engines.explicit.lanes import (
+from dem_cli.geometry.lanes import (
     WIDTH,
     gather_difference,
     gather_sum,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dem_cli.engines.explicit.lanes import maximum, minimum, where
+from dem_cli.geometry.lanes import maximum, minimum, where
 from dem_cli.jit import kernel
 
 

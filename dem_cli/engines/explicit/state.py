@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem_cli.assembly import Assembly
-from dem_cli.engines.cells import order_by_columns
+from dem_cli.geometry.cells import order_by_columns
 from dem_cli.engines.explicit import step
 from dem_cli.engines.explicit.forces import ARC, FX, MOBILITY, ROW, Q, R, U, V, X, Y, wall_direction
 from dem_cli.engines.explicit.law import Law, make_law
@@ -186,6 +186,9 @@ class ExplicitState:
             mass=mass,
             inertia=mass * radius**2 / DISC_INERTIA,
             escaped=~self.alive[row],
+            a=radius,
+            b=radius,
+            body=np.arange(n, dtype=np.int64),
         )
 
     def contacts(self) -> Contacts:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from dem_cli.engines.cells import carry_memory, neighbour_list, neighbour_list_all_pairs, order_by_columns
+from dem_cli.geometry.cells import carry_memory, neighbour_list, neighbour_list_all_pairs, order_by_columns
 from dem_cli.state import Bools, Floats, Ints
 
 Sample = tuple[Floats, Floats, Floats, Bools, float]

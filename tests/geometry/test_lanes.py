@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dem_cli.engines.explicit import lanes
-from dem_cli.engines.explicit.lanes import (
+from dem_cli.geometry.lanes import (
     first_half_last,
     gather_difference,
     gather_sum,
