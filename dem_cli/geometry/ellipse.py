@@ -84,7 +84,7 @@ def _climb(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny, reach):
 def widest_gap(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny):
     """Unit direction of the largest gap between two outlines, and the gap [m].
 
-    dx, dy: from centre i to centre j [m], not both 0; nx, ny: a direction known to be near, or (0, 0): then, and where the known one turns out to
+    dx, dy: from centre i to centre j [m], not both 0; nx, ny: a direction known to be near, or (0, 0): then, and where the known one proves to
     be far off, all directions are searched. Returns (nx, ny, gap).
     """
     if nx * nx + ny * ny > 0.0:

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from dem_cli.engines.explicit import lanes
+from dem_cli.geometry import lanes
 from dem_cli.geometry.lanes import (
     first_half_last,
     gather_difference,

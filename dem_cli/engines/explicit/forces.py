@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dem_cli.engines.explicit.law import contact_force, contact_losses
 from dem_cli.geometry.lanes import (
     WIDTH,
     gather_difference,
@@ -22,7 +23,6 @@ from dem_cli.geometry.lanes import (
     store,
     unpack,
 )
-from dem_cli.engines.explicit.law import contact_force, contact_losses
 from dem_cli.jit import kernel
 
 X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, _, TURN = range(12)

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dem_cli.geometry.cells import carry_memory, neighbour_list
 from dem_cli.engines.explicit.forces import CHUNK, MOBILITY, ROW, Pairs, Q, R, X, Y, wall_direction
+from dem_cli.geometry.cells import carry_memory, neighbour_list
 from dem_cli.geometry.lanes import WIDTH
 from dem_cli.jit import kernel
 

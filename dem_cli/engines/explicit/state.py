@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem_cli.assembly import Assembly
-from dem_cli.geometry.cells import order_by_columns
 from dem_cli.engines.explicit import step
 from dem_cli.engines.explicit.forces import ARC, FX, MOBILITY, ROW, Q, R, U, V, X, Y, wall_direction
 from dem_cli.engines.explicit.law import Law, make_law
 from dem_cli.engines.explicit.lists import Lists
 from dem_cli.engines.explicit.observe import touching_contacts
 from dem_cli.engines.explicit.step import DISC_INERTIA, LEAPFROG, LEDGER, THESIS, Box, Motion
+from dem_cli.geometry.cells import order_by_columns
 from dem_cli.scenario import Scenario
 from dem_cli.state import Bools, Contacts, Energy, Floats, Frame, Grains, Ints, Walls
 

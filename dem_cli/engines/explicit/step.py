@@ -26,7 +26,6 @@ from dem_cli.engines.explicit.forces import (
     pair_forces,
     wall_forces,
 )
-from dem_cli.geometry.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
 from dem_cli.engines.explicit.lists import (
     FINE,
     NOT_A_NUMBER,
@@ -36,6 +35,7 @@ from dem_cli.engines.explicit.lists import (
     outer_lists,
     remember,
 )
+from dem_cli.geometry.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
 from dem_cli.jit import kernel
 
 LEAPFROG, THESIS = 0, 1
