@@ -84,8 +84,9 @@ class Grains:
         return int(self.body[-1]) + 1 if len(self) else 0
 
     def take(self, index: Ints | Bools) -> Grains:
-        """The grains at `index`, copied."""
-        return replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        """The elements at `index`, copied; grains are numbered anew, neighbours of one body stay one."""
+        taken = replace(self, **{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        return replace(taken, body=np.cumsum(np.diff(taken.body, prepend=taken.body[:1]) != 0))
 
 
 @dataclass(frozen=True)

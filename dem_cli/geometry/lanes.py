@@ -272,24 +272,72 @@ def gather_sum(typing, rows, first, second, k, column):
 
 
 @intrinsic
+def gather_column(_typing, rows, offsets, k, column):
+    """One column of the rows at the entries k..k+3 of an int32 list of offsets."""
+
+    def emit(context, builder, sig, args):
+        data, list_data = (_data(context, builder, sig.args[n], args[n]) for n in range(2))
+        out = ir.Constant(_VECTOR, ir.Undefined)
+        for lane, offset in enumerate(_offsets(builder, list_data, args[2])):
+            value = builder.load(builder.gep(data, [builder.add(offset, args[3])], inbounds=True))
+            out = builder.insert_element(out, value, ir.Constant(ir.IntType(32), lane))
+        return out
+
+    return lanes(rows, offsets, types.intp, types.intp), emit
+
+
+@intrinsic
+def gather_thirds(_typing, fours, offsets, k):
+    """The four columns of rows of four, for the entries k..k+3 of an int32 list of offsets of rows of twelve."""
+
+    def emit(context, builder, sig, args):
+        data, list_data = (_data(context, builder, sig.args[n], args[n]) for n in range(2))
+        three = ir.Constant(ir.IntType(64), 3)
+        rows = [_read(builder, data, builder.udiv(at, three)) for at in _offsets(builder, list_data, args[2])]
+        return context.make_tuple(builder, sig.return_type, _transpose(builder, rows))
+
+    return types.UniTuple(lanes, 4)(fours, offsets, types.intp), emit
+
+
+def _add_to_rows(context: Any, builder: Any, sig: Any, args: Any, reactions: Any, actions: Any) -> Any:
+    """Add reactions to first's and actions to second's four columns from args[4] on, pair after pair."""
+    data, i, j = _chunks(context, builder, sig, args)
+    for m in range(WIDTH):
+        for row, value in ((i[m], reactions[m]), (j[m], actions[m])):
+            _write(builder, builder.fadd(_read(builder, data, row), value), data, row)
+    return context.get_dummy_value()
+
+
+@intrinsic
 def scatter_action(_typing, rows, first, second, k, column, x, y, turn):
-    """Action and reaction of the pairs k..k+3, pair after pair: (x, y, 0, turn) is added to the four columns of second's row from
-    `column` on, (-x, -y, 0, turn) to those of first's.
+    """Action and reaction of the pairs k..k+3: (x, y, 0, turn) is added to the four columns of second's row from `column` on,
+    (-x, -y, 0, turn) to those of first's.
     """
 
     def emit(context, builder, sig, args):
-        data, i, j = _chunks(context, builder, sig, args)
         zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
-        columns = _transpose(builder, [args[5], args[6], zero, args[7]])
+        actions = _transpose(builder, [args[5], args[6], zero, args[7]])
         integers = ir.VectorType(ir.IntType(64), WIDTH)
         signs = ir.Constant(integers, [-(1 << 63), -(1 << 63), 0, 0])
-        for m in range(WIDTH):
-            turned = builder.bitcast(builder.xor(builder.bitcast(columns[m], integers), signs), _VECTOR)
-            for row, value in ((i[m], turned), (j[m], columns[m])):
-                _write(builder, builder.fadd(_read(builder, data, row), value), data, row)
-        return context.get_dummy_value()
+        reactions = [
+            builder.bitcast(builder.xor(builder.bitcast(action, integers), signs), _VECTOR) for action in actions
+        ]
+        return _add_to_rows(context, builder, sig, args, reactions, actions)
 
     return types.void(rows, first, second, types.intp, types.intp, x, y, turn), emit
+
+
+@intrinsic
+def scatter_wrench(_typing, rows, first, second, k, column, x, y, turn_first, turn_second):
+    """Like `scatter_action`, with a turn of its own for each of the two."""
+
+    def emit(context, builder, sig, args):
+        zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
+        actions = _transpose(builder, [args[5], args[6], zero, args[8]])
+        reactions = _transpose(builder, [builder.fneg(args[5]), builder.fneg(args[6]), zero, args[7]])
+        return _add_to_rows(context, builder, sig, args, reactions, actions)
+
+    return types.void(rows, first, second, types.intp, types.intp, x, y, turn_first, turn_second), emit
 
 
 @intrinsic

@@ -24,16 +24,9 @@ def blown_up(scenario: Scenario, state: ExplicitState, status: int, i: int, j: i
         cause = f"the position of grain {grain} is no longer a number"
         remedy = f"Take a smaller time step than {time_step:.3g} s ([integration] time_step or safety)"
         return RunError(f"{when}: {cause}. {remedy}")
-    n = len(state.mass)
-    if j >= n:
-        other = f"the {state.wall_names[j - n]} wall"
-        overlap = float(state.radius[i]) - state.wall_distance(i, j - n)
-        least = float(state.radius[i])
-    else:
-        other = f"grain {int(state.order[j])}"
-        x, y = state.positions()
-        overlap = float(state.radius[i] + state.radius[j] - math.hypot(x[i] - x[j], y[i] - y[j]))
-        least = float(min(state.radius[i], state.radius[j]))
+    n, overlap = len(state.mass), state.overlap(i, j)
+    least = float(state.radius[i] if j >= n else min(state.radius[i], state.radius[j]))
+    other = f"the {state.wall_names[j - n]} wall" if j >= n else f"grain {int(state.order[j])}"
     limit = scenario.integration.max_overlap
     return RunError(
         f"{when}: grain {grain} and {other} overlap by {overlap / least:.2g} of the smaller radius, more than "

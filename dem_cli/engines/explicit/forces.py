@@ -1,7 +1,7 @@
 """Forces of contacts on grains: discs with discs four at a time, walls one by one, both under the law of `law.py`.
 
 Lengths are metres, forces are in units of kn and times in units of the step, so that most factors vanish. A grain is one row of
-twelve: [x, y, u dt, v dt | q = w r dt, r, kn dt^2/m, r angle | Fx, Fy, -, M/r, all over kn]; each third of it is read at once.
+twelve: [x, y, u dt, v dt | q = w r dt, r, kn dt^2/m, r angle | Fx, Fy, m r^2/I, M/r, forces over kn]; each third of it is read at once.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ from dem_cli.geometry.lanes import (
 )
 from dem_cli.jit import kernel
 
-X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, _, TURN = range(12)
+X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, RATIO, TURN = range(12)
 ROW = 12
-CHUNK = 4096  # grains whose rows and pairs fit into the second level of cache
+CHUNK = 4096  # about as many grains as have rows and pairs that fit into the second level of cache
 
 
 class Pairs(NamedTuple):
     """Contacts that may open or close soon: flat arrays, a pair an entry, sorted by the first body.
 
-    chunk (chunks + 1,): where the pairs of each CHUNK of grains begin; those of two grains are padded to multiples of WIDTH.
+    chunk (chunks + 1,): where the pairs of each chunk of grains begin; those of two grains are padded to multiples of WIDTH.
     first, second: int32 offsets of the bodies' rows, ROW times their number (second: the number of the wall for walls); outer: entry
     of the list they were taken from, -1 for padding; spring, dashpot_n, dashpot_s: memory of the last step in units of kn;
-    inertia_root: 1/sqrt(kn dt^2/m_eff).
+    inertia_root: 1/sqrt(kn dt^2/m_eff); nx, ny: unit normal of the last step, of ellipses only.
     """
 
     chunk: np.ndarray
@@ -47,6 +47,8 @@ class Pairs(NamedTuple):
     dashpot_n: np.ndarray
     dashpot_s: np.ndarray
     inertia_root: np.ndarray
+    nx: np.ndarray
+    ny: np.ndarray
 
 
 @kernel(inline=True)
