@@ -234,6 +234,36 @@ def store(_typing, array, k, value):
     return types.void(array, types.intp, value), emit
 
 
+@intrinsic
+def load_rows(_typing, array, start, stride):
+    """Four columns of the four rows that begin at start, start + stride, ..."""
+
+    def emit(context, builder, sig, args):
+        data = _data(context, builder, sig.args[0], args[0])
+        rows = [_read(builder, data, at) for at in _strided(builder, args[1], args[2])]
+        return context.make_tuple(builder, sig.return_type, _transpose(builder, rows))
+
+    return types.UniTuple(lanes, 4)(array, types.intp, types.intp), emit
+
+
+@intrinsic
+def store_rows(_typing, array, start, stride, a, b, c, d):
+    """Write four columns back to the rows that `load_rows` reads."""
+
+    def emit(context, builder, sig, args):
+        data = _data(context, builder, sig.args[0], args[0])
+        rows = _transpose(builder, list(args[3:]))
+        for at, row in zip(_strided(builder, args[1], args[2]), rows, strict=True):
+            _write(builder, row, data, at)
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, types.intp, a, b, c, d), emit
+
+
+def _strided(builder: Any, start: Any, stride: Any) -> list[Any]:
+    return [builder.add(start, builder.mul(stride, _word(lane))) for lane in range(WIDTH)]
+
+
 def _chunks(context: Any, builder: Any, sig: Any, args: Any) -> tuple[Any, list[Any], list[Any]]:
     """Data of `rows`, and where the chunk at `column` of first's and second's rows begins: arguments rows, first, second, k, column."""
     data, one, two = (_data(context, builder, sig.args[n], args[n]) for n in range(3))

@@ -10,106 +10,136 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.explicit.forces import ARC, FX, FY, MOBILITY, RATIO, ROW, TURN, Q, R, U, V, X, Y
+from dem_cli.geometry.lanes import WIDTH, load_rows, maximum, root, spread, store_rows, unpack, where
 from dem_cli.jit import kernel
 
-# Columns of a bond. Fixed: share of the way from i to j at which the common point lies, Cn, Cs [N s/m], Cr [N m s], length at rest [m].
-SHARE, NORMAL, TANGENTIAL, ROLLING, LENGTH = range(5)
-# Its memory: force on i along n and t over kn [m], moment on i over kn [m^2], slip at the common point [m], turn of j against i.
-PULL, SHEAR, MOMENT, SLIP, ROLL = range(5, 10)
-# What holds within a step: unit vector n from i to j at its middle; places of the common point seen from i and j along n and t = (-ny, nx);
-# motion of j against i before the step along n, t and about.
-NX, NY, AI, BI, AJ, BJ, FAR_N, FAR_T, FAR_R = range(10, 19)
-BOND = 19
+# Columns of a bond. Share of the way from i to j at which the common point lies; Cn, Cs [N s/m], Cr [N m s].
+SHARE, NORMAL, TANGENTIAL, ROLLING = range(4)
+# Force on i along n and t over kn [m], moment on i over kn [m^2]; length at rest [m]; slip at the common point [m], turn of j against i [rad].
+PULL, SHEAR, MOMENT, LENGTH, SLIP, ROLL = range(4, 10)
+# What holds within a step: see `_geometry` and `_relative`.
+NX, NY, AI, BI, AJ, BJ, AWAY, BESIDE, ABOUT = range(12, 21)
+BOND = 21
+TINY = 1e-280  # a viscosity that is none
 
 
 class Bonded(NamedTuple):
     """Bonds of all bodies: first, second (b,) int32 row offsets of their discs; data (b * BOND,); edges (chunks + 1,): first bond of each
-    chunk of grains, and b.
+    chunk of grains, and b; paired: every disc has exactly one bond, so that bond k joins the rows 2 k and 2 k + 1.
     """
 
     first: np.ndarray
     second: np.ndarray
     data: np.ndarray
     edges: np.ndarray
+    paired: bool
+
+
+# The functions below take floats or Lanes. motion: (u, v, w) of the first and of the second disc, ways [m] and turn [rad] in a step; inertia:
+# kn dt^2/m of both and kn dt^2/I of both.
 
 
 @kernel(inline=True)
-def _motion(rows, a, b, data, o):
-    """Motion of the second disc against the first at the common point: along n, along t [m] and about [rad] in a step."""
-    nx, ny = data[o + NX], data[o + NY]
-    du, dv = rows[b + U] - rows[a + U], rows[b + V] - rows[a + V]
-    wi, wj = rows[a + Q] / rows[a + R], rows[b + Q] / rows[b + R]
+def _geometry(dx, dy, motion, share):
+    """(nx, ny, ai, bi, aj, bj): unit vector, and where the common point lies from i and from j, along n and t = (-ny, nx).
+
+    dx, dy: from i to j. The unit vector is that of the middle of the step, from the motion of the last one: so a turning body neither
+    shrinks nor grows. The forces act at the one common point of now: whatever their direction, they keep the angular momentum.
+    """
+    ui, vi, _, uj, vj, _ = motion
+    mx, my = dx + 0.5 * (uj - ui), dy + 0.5 * (vj - vi)
+    inverse = 1.0 / root(mx * mx + my * my)
+    nx, ny = mx * inverse, my * inverse
+    along, across = dx * nx + dy * ny, dy * nx - dx * ny
+    return nx, ny, share * along, share * across, (share - 1.0) * along, (share - 1.0) * across
+
+
+@kernel(inline=True)
+def _relative(motion, geometry):
+    """Motion of the second disc against the first at the common point: along n, along t [m], and about [rad]."""
+    ui, vi, wi, uj, vj, wj = motion
+    nx, ny, ai, bi, aj, bj = geometry
+    du, dv = uj - ui, vj - vi
+    return du * nx + dv * ny - wj * bj + wi * bi, dv * nx - du * ny + wj * aj - wi * ai, wj - wi
+
+
+@kernel(inline=True)
+def _pushed(motion, geometry, inertia, kick, pull, shear, moment):
+    """The motion after `kick` steps of a bond's forces on the first disc and their reactions on the second."""
+    ui, vi, wi, uj, vj, wj = motion
+    nx, ny, ai, bi, aj, bj = geometry
+    mi, mj, ki, kj = inertia
+    fx, fy = kick * (pull * nx - shear * ny), kick * (pull * ny + shear * nx)
     return (
-        du * nx + dv * ny - wj * data[o + BJ] + wi * data[o + BI],
-        dv * nx - du * ny + wj * data[o + AJ] - wi * data[o + AI],
-        wj - wi,
+        ui + mi * fx,
+        vi + mi * fy,
+        wi + kick * ki * (ai * shear - bi * pull + moment),
+        uj - mj * fx,
+        vj - mj * fy,
+        wj - kick * kj * (aj * shear - bj * pull + moment),
     )
+
+
+@kernel(inline=True)
+def _settled(motion, geometry, inertia, kick, give, forces):
+    """Motion and forces once each dashpot gives what the motion after it asks for (backward Euler), one direction after the other.
+
+    give: kn dt over the three viscosities; forces: (pull, shear, moment) that the motion holds already.
+    """
+    mi, mj, ki, kj = inertia
+    _, _, ai, bi, aj, bj = geometry
+    pull, shear, moment = forces
+    away, _, _ = _relative(motion, geometry)
+    more = (away - give[0] * pull) / (give[0] + kick * (mi + mj + ki * bi * bi + kj * bj * bj))
+    motion, pull = _pushed(motion, geometry, inertia, kick, more, 0.0, 0.0), pull + more
+    _, beside, _ = _relative(motion, geometry)
+    more = (beside - give[1] * shear) / (give[1] + kick * (mi + mj + ki * ai * ai + kj * aj * aj))
+    motion, shear = _pushed(motion, geometry, inertia, kick, 0.0, more, 0.0), shear + more
+    _, _, about = _relative(motion, geometry)
+    more = (about - give[2] * moment) / (give[2] + kick * (ki + kj))
+    motion, moment = _pushed(motion, geometry, inertia, kick, 0.0, 0.0, more), moment + more
+    return motion, (pull, shear, moment)
+
+
+@kernel(inline=True)
+def _losses(kick, forces, before, after):
+    """Twice the energy over kn that a bond takes from a motion: its force times the mean of the motions before and after the step."""
+    return kick * (
+        forces[0] * (before[0] + after[0]) + forces[1] * (before[1] + after[1]) + forces[2] * (before[2] + after[2])
+    )
+
+
+@kernel(inline=True)
+def _read(rows, a, b):
+    """Motion and inertia of the discs at the row offsets a and b."""
+    ri, rj = 1.0 / rows[a + R], 1.0 / rows[b + R]
+    mi, mj = rows[a + MOBILITY], rows[b + MOBILITY]
+    motion = (rows[a + U], rows[a + V], rows[a + Q] * ri, rows[b + U], rows[b + V], rows[b + Q] * rj)
+    return motion, (mi, mj, mi * rows[a + RATIO] * ri * ri, mj * rows[b + RATIO] * rj * rj)
+
+
+@kernel(inline=True)
+def _write(rows, a, b, motion):
+    rows[a + U], rows[a + V], rows[a + Q] = motion[0], motion[1], motion[2] * rows[a + R]
+    rows[b + U], rows[b + V], rows[b + Q] = motion[3], motion[4], motion[5] * rows[b + R]
+
+
+@kernel(inline=True)
+def _known(data, o):
+    return data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ]
 
 
 @kernel()
 def prepare_bonds(rows, bonds, begin, end):
-    """Geometry and motion of the bonds begin..end-1 before their discs are pushed.
-
-    The unit vector is that of the middle of the step, from the motion of the last one: so a turning body neither shrinks nor grows. The forces
-    act at the one common point of now: whatever their direction, they keep the angular momentum.
-    """
+    """Geometry and motion of the bonds begin..end-1 before their discs are pushed."""
     data = bonds.data
     for k in range(begin, end):
         a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
+        motion, _ = _read(rows, a, b)
         dx, dy = rows[b + X] - rows[a + X], rows[b + Y] - rows[a + Y]
-        mx, my = dx + 0.5 * (rows[b + U] - rows[a + U]), dy + 0.5 * (rows[b + V] - rows[a + V])
-        inverse = 1.0 / np.sqrt(mx * mx + my * my)
-        nx, ny = mx * inverse, my * inverse
-        along, across = dx * nx + dy * ny, dy * nx - dx * ny
-        share = data[o + SHARE]
-        data[o + NX], data[o + NY] = nx, ny
-        data[o + AI], data[o + BI] = share * along, share * across
-        data[o + AJ], data[o + BJ] = (share - 1.0) * along, (share - 1.0) * across
-        data[o + FAR_N], data[o + FAR_T], data[o + FAR_R] = _motion(rows, a, b, data, o)
-
-
-@kernel(inline=True)
-def _push(rows, a, b, data, o, kick, pull, shear, moment):
-    """Change velocities by `kick` steps of a bond's force on the first disc and its reaction on the second."""
-    nx, ny = data[o + NX], data[o + NY]
-    fx, fy = kick * (pull * nx - shear * ny), kick * (pull * ny + shear * nx)
-    mi, mj = rows[a + MOBILITY], rows[b + MOBILITY]
-    rows[a + U] += mi * fx
-    rows[a + V] += mi * fy
-    rows[b + U] -= mj * fx
-    rows[b + V] -= mj * fy
-    about_i = data[o + AI] * shear - data[o + BI] * pull + moment
-    about_j = data[o + AJ] * shear - data[o + BJ] * pull + moment
-    rows[a + Q] += kick * mi * rows[a + RATIO] / rows[a + R] * about_i
-    rows[b + Q] -= kick * mj * rows[b + RATIO] / rows[b + R] * about_j
-
-
-@kernel(inline=True)
-def _solve(rows, a, b, data, o, kick, unit):
-    """Set the forces of one bond to what its dashpots give for the motion after them (backward Euler), one direction after the other.
-
-    unit: kn dt, which turns a viscosity into force over kn per way in a step.
-    """
-    mi, mj = rows[a + MOBILITY], rows[b + MOBILITY]
-    ri, rj = rows[a + R], rows[b + R]
-    ki, kj = mi * rows[a + RATIO] / (ri * ri), mj * rows[b + RATIO] / (rj * rj)
-    ai, bi, aj, bj = data[o + AI], data[o + BI], data[o + AJ], data[o + BJ]
-    away, _, _ = _motion(rows, a, b, data, o)
-    give = unit / data[o + NORMAL]
-    pull = (away - give * data[o + PULL]) / (give + kick * (mi + mj + ki * bi * bi + kj * bj * bj))
-    _push(rows, a, b, data, o, kick, pull, 0.0, 0.0)
-    data[o + PULL] += pull
-    _, beside, _ = _motion(rows, a, b, data, o)
-    give = unit / data[o + TANGENTIAL]
-    shear = (beside - give * data[o + SHEAR]) / (give + kick * (mi + mj + ki * ai * ai + kj * aj * aj))
-    _push(rows, a, b, data, o, kick, 0.0, shear, 0.0)
-    data[o + SHEAR] += shear
-    if data[o + ROLLING] > 0.0:
-        _, _, about = _motion(rows, a, b, data, o)
-        give = unit / data[o + ROLLING]
-        moment = (about - give * data[o + MOMENT]) / (give + kick * (ki + kj))
-        _push(rows, a, b, data, o, kick, 0.0, 0.0, moment)
-        data[o + MOMENT] += moment
+        geometry = _geometry(dx, dy, motion, data[o + SHARE])
+        data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ] = geometry
+        data[o + AWAY], data[o + BESIDE], data[o + ABOUT] = _relative(motion, geometry)
 
 
 @kernel()
@@ -118,22 +148,29 @@ def solve_bonds(rows, bonds, begin, end, kick, unit, backward):
 
     Implicit, so any viscosity is stable, and a load F creeps at exactly F/C. One Gauss-Seidel sweep a step, in turn from either end and begun
     with the forces of the last step, follows chains as well as the full solution does (without that start it is wrong by
-    orders of magnitude). Returns twice the energy lost, over kn.
+    orders of magnitude). unit: kn dt. Returns twice the energy lost, over kn.
     """
     data, lost = bonds.data, 0.0
     for k in range(begin, end):
-        o = BOND * k
-        a, b = np.int64(bonds.first[k]), np.int64(bonds.second[k])
-        _push(rows, a, b, data, o, kick, data[o + PULL], data[o + SHEAR], data[o + MOMENT])
+        a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
+        motion, inertia = _read(rows, a, b)
+        forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        _write(rows, a, b, _pushed(motion, _known(data, o), inertia, kick, *forces))
     for m in range(end - begin):
         k = end - 1 - m if backward else begin + m
-        _solve(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]), data, BOND * k, kick, unit)
+        a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
+        motion, inertia = _read(rows, a, b)
+        give = unit / data[o + NORMAL], unit / data[o + TANGENTIAL], unit / max(data[o + ROLLING], TINY)
+        forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        motion, forces = _settled(motion, _known(data, o), inertia, kick, give, forces)
+        data[o + PULL], data[o + SHEAR], data[o + MOMENT] = forces
+        _write(rows, a, b, motion)
     for k in range(begin, end):
         o = BOND * k
-        away, beside, about = _motion(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]), data, o)
-        lost += kick * data[o + PULL] * (away + data[o + FAR_N])
-        lost += kick * data[o + SHEAR] * (beside + data[o + FAR_T])
-        lost += kick * data[o + MOMENT] * (about + data[o + FAR_R])
+        motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
+        forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        before = data[o + AWAY], data[o + BESIDE], data[o + ABOUT]
+        lost += _losses(kick, forces, before, _relative(motion, _known(data, o)))
     return lost
 
 
@@ -143,9 +180,71 @@ def follow_bonds(rows, bonds, begin, end):
     data = bonds.data
     for k in range(begin, end):
         o = BOND * k
-        _, beside, about = _motion(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]), data, o)
+        motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
+        _, beside, about = _relative(motion, _known(data, o))
         data[o + SLIP] += beside
         data[o + ROLL] += about
+
+
+@kernel(inline=True)
+def _kicked(rows, a, kick, fx, fy):
+    """Four discs whose rows begin at a, a + 2 ROW, ...: places, motion before and after their forces, inertia, radius and what rows hold."""
+    x, y, u, v = load_rows(rows, a, 2 * ROW)
+    q, r, mobility, arc = load_rows(rows, a + Q, 2 * ROW)
+    pushes_x, pushes_y, ratio, turn = load_rows(rows, a + FX, 2 * ROW)
+    inverse = 1.0 / r
+    turnable = mobility * ratio * inverse
+    share = where(mobility > 0.0, spread(kick), 0.0)
+    before = (u, v, q * inverse)
+    after = (
+        u + share * (mobility * pushes_x + fx),
+        v + share * (mobility * pushes_y + fy),
+        before[2] + share * turnable * turn,
+    )
+    return x, y, before, after, mobility, turnable * inverse, r, arc, ratio
+
+
+@kernel(inline=True)
+def _moved(rows, a, x, y, motion, r, mobility, arc, ratio):
+    """Write four discs back after a step with their new motion, forces set to zero; returns squared displacements."""
+    u, v, q = motion[0], motion[1], motion[2] * r
+    zero = spread(0.0)
+    store_rows(rows, a, 2 * ROW, x + u, y + v, u, v)
+    store_rows(rows, a + Q, 2 * ROW, q, r, mobility, arc + q)
+    store_rows(rows, a + FX, 2 * ROW, zero, zero, ratio, zero)
+    return u * u + v * v
+
+
+@kernel()
+def move_pairs(rows, bonds, begin, end, kick, fx, fy, unit):
+    """Leapfrog of the pairs begin..end-1, a multiple of WIDTH, four at a time: what prepare, push, solve, drift and follow do one by one.
+
+    Returns (largest squared displacement [m^2], twice the energy lost to bonds over kn).
+    """
+    data = bonds.data
+    most, lost = spread(0.0), spread(0.0)
+    for k in range(begin, end, WIDTH):
+        a, b, o = 2 * ROW * k, 2 * ROW * k + ROW, BOND * k
+        share, normal, tangential, rolling = load_rows(data, o, BOND)
+        pull, shear, moment, length = load_rows(data, o + PULL, BOND)
+        slip, roll, _, _ = load_rows(data, o + SLIP, BOND)
+        xi, yi, before_i, after_i, mi, ki, ri, arc_i, ratio_i = _kicked(rows, a, kick, fx, fy)
+        xj, yj, before_j, after_j, mj, kj, rj, arc_j, ratio_j = _kicked(rows, b, kick, fx, fy)
+        before, inertia = before_i + before_j, (mi, mj, ki, kj)
+        geometry = _geometry(xj - xi, yj - yi, before, share)
+        give = unit / normal, unit / tangential, unit / maximum(rolling, TINY)
+        motion = _pushed(after_i + after_j, geometry, inertia, kick, pull, shear, moment)
+        motion, forces = _settled(motion, geometry, inertia, kick, give, (pull, shear, moment))
+        relative = _relative(motion, geometry)
+        lost = lost + _losses(kick, forces, _relative(before, geometry), relative)
+        store_rows(data, o + PULL, BOND, forces[0], forces[1], forces[2], length)
+        zero = spread(0.0)
+        store_rows(data, o + SLIP, BOND, slip + relative[1], roll + relative[2], zero, zero)
+        most = maximum(_moved(rows, a, xi, yi, motion[:3], ri, mi, arc_i, ratio_i), most)
+        most = maximum(_moved(rows, b, xj, yj, motion[3:], rj, mj, arc_j, ratio_j), most)
+    p, q, r, s = unpack(most)
+    t, u, v, w = unpack(lost)
+    return max(max(p, q), max(r, s)), t + u + v + w
 
 
 class Cores(NamedTuple):

@@ -58,8 +58,9 @@ def sort_bonds(i: Ints, j: Ints, data: Floats, edges: Ints) -> tuple[Bonded, Int
     """Bonds between the rows i and j with their data (b, BOND), sorted by i; and the permutation that sorts them."""
     order = np.lexsort((j, i))
     first = np.searchsorted(i[order], edges)
+    paired = np.array_equal(np.stack([i[order], j[order]], axis=1).ravel(), np.arange(edges[-1]))
     bonded = Bonded(
-        (ROW * i[order]).astype(np.int32), (ROW * j[order]).astype(np.int32), data[order].reshape(-1), first
+        (ROW * i[order]).astype(np.int32), (ROW * j[order]).astype(np.int32), data[order].reshape(-1), first, paired
     )
     return bonded, order
 

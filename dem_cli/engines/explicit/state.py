@@ -85,8 +85,7 @@ class ExplicitState:
         rows[:n, MOBILITY], rows[:n, ARC] = kn * dt**2 / mass, grains.angle * grains.radius
         rows[:n, RATIO] = np.where(grains.inertia > 0.0, grains.mass * grains.radius**2 / grains.inertia, 2.0)
         rows[n, X], rows[n + 1, X] = -FAR, FAR
-        several = grains.grain_count < n
-        body = grains.body.copy() if several else None
+        body = grains.body.copy() if assembly.rigid or grains.grain_count < n else None
         edges = chunk_edges(n, body)
         outlines = outlines_of(grains, enlarged=scenario.contact.ellipse_test == "enlarged")
         return cls(

@@ -11,6 +11,7 @@ import numpy as np
 from dem_cli.engines.explicit.bodies import (
     follow_bonds,
     gather_cores,
+    move_pairs,
     prepare_bonds,
     solve_bonds,
     spread_cores,
@@ -34,6 +35,7 @@ from dem_cli.engines.explicit.lists import (
     remember,
 )
 from dem_cli.engines.explicit.moves import LEAPFROG, THESIS, drift, let_go, mass_moved, move, push
+from dem_cli.geometry.lanes import WIDTH
 from dem_cli.jit import kernel
 
 # Entries of the ledger that the loop adds up [J]
@@ -59,10 +61,16 @@ def _move_chunk(rows, velocity, begin, end, c, kick, fx, fy, motion, kn, dt, bac
         return spread_cores(rows, cores, first, last)
     if bonds is not None:
         first, last = bonds.edges[c], bonds.edges[c + 1]
+        fastest = 0.0
+        if bonds.paired and not general:
+            middle = first + (last - first) // WIDTH * WIDTH
+            fastest, lost = move_pairs(rows, bonds, first, middle, kick, fx, fy, kn * dt)
+            ledger[BONDS] += 0.5 * kn * lost
+            first, begin = middle, begin + 2 * (middle - first)
         prepare_bonds(rows, bonds, first, last)
         ledger[DAMPING] += kn * push(rows, velocity, begin, end, kick, fx, fy, motion, dt)
         ledger[BONDS] += 0.5 * kn * solve_bonds(rows, bonds, first, last, kick, kn * dt, backward)
-        fastest = drift(rows, velocity, begin, end, thesis)
+        fastest = max(fastest, drift(rows, velocity, begin, end, thesis))
         follow_bonds(rows, bonds, first, last)
         return fastest
     if general:
