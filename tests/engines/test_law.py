@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dem_cli.engines.explicit.law import Law, contact_force, contact_losses, make_law
-from dem_cli.geometry.lanes import load, store
+from dem_cli.geometry.rows import load, store
 from dem_cli.jit import kernel
 
 KN = 1e6

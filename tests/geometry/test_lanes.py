@@ -8,22 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from dem_cli.geometry import lanes
-from dem_cli.geometry.lanes import (
-    first_half_last,
-    gather_difference,
-    gather_sum,
-    last_half_first,
-    load,
-    maximum,
-    minimum,
-    pack,
-    root,
-    scatter_action,
-    spread,
-    store,
-    unpack,
-    where,
-)
+from dem_cli.geometry.lanes import first_half_last, last_half_first, maximum, minimum, pack, root, spread, unpack, where
+from dem_cli.geometry.rows import gather_difference, gather_sum, load, scatter_action, store
 from dem_cli.jit import kernel
 
 WIDTH = lanes.WIDTH

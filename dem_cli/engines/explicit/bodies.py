@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.explicit.forces import ARC, FX, FY, MOBILITY, RATIO, ROW, TURN, Q, R, U, V, X, Y
-from dem_cli.geometry.lanes import WIDTH, load_rows, maximum, root, spread, store_rows, unpack, where
+from dem_cli.geometry.lanes import WIDTH, maximum, root, spread, unpack, where
+from dem_cli.geometry.rows import load_rows, store_rows
 from dem_cli.jit import kernel
 
 # Columns of a bond. Share of the way from i to j at which the common point lies; Cn, Cs [N s/m], Cr [N m s].

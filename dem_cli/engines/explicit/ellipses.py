@@ -14,19 +14,8 @@ from dem_cli.engines.explicit.forces import FX, FY, MOBILITY, ROW, TURN, Q, R, U
 from dem_cli.engines.explicit.law import contact_force, contact_losses
 from dem_cli.engines.explicit.lists import FINE, TOO_DEEP, cut, empty_pairs, fill_up, next_chunk, recall
 from dem_cli.geometry.ellipse import support, wall_gap, widest_gap
-from dem_cli.geometry.lanes import (
-    WIDTH,
-    gather_column,
-    gather_difference,
-    gather_thirds,
-    load,
-    maximum,
-    root,
-    scatter_wrench,
-    spread,
-    store,
-    unpack,
-)
+from dem_cli.geometry.lanes import WIDTH, maximum, root, spread, unpack
+from dem_cli.geometry.rows import gather_column, gather_difference, gather_thirds, load, scatter_wrench, store
 from dem_cli.jit import kernel
 
 FOUR = 4

@@ -11,18 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.explicit.law import contact_force, contact_losses
-from dem_cli.geometry.lanes import (
-    WIDTH,
-    gather_difference,
-    gather_sum,
-    load,
-    maximum,
-    root,
-    scatter_action,
-    spread,
-    store,
-    unpack,
-)
+from dem_cli.geometry.lanes import WIDTH, maximum, root, spread, unpack
+from dem_cli.geometry.rows import gather_difference, gather_sum, load, scatter_action, store
 from dem_cli.jit import kernel
 
 X, Y, U, V, Q, R, MOBILITY, ARC, FX, FY, RATIO, TURN = range(12)

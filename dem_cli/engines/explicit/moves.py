@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.explicit.forces import ARC, FX, FY, MOBILITY, RATIO, ROW, TURN, Q, R, U, V, X, Y
-from dem_cli.geometry.lanes import first_half_last, last_half_first, load, maximum, pack, spread, store, unpack
+from dem_cli.geometry.lanes import first_half_last, last_half_first, maximum, pack, spread, unpack
+from dem_cli.geometry.rows import load, store
 from dem_cli.jit import kernel
 
 LEAPFROG, THESIS = 0, 1
