@@ -17,7 +17,7 @@ from scenario_text import ABSENT, small
 from dem_cli.cli import main
 from dem_cli.cli.check import clock, counted, human
 from dem_cli.cli.derived import derive, file_bytes
-from dem_cli.engines.explicit.timestep import critical_time_step, thesis_time_step
+from dem_cli.engines.explicit.timestep import critical_time_step, disc_modes, thesis_time_step
 from dem_cli.results.writer import ResultWriter
 from dem_cli.scenario import parse_scenario
 from dem_cli.state import Contacts, Energy, Frame, Grains, Walls
@@ -78,7 +78,7 @@ def test_grains_are_those_that_a_run_draws() -> None:
 def test_time_step() -> None:
     d = derived()
     lightest = d["mass"][0]
-    assert d["time_step_limit"] == critical_time_step(d["kn"], d["ks"], lightest, 1.0, 1.0)
+    assert d["time_step_limit"] == critical_time_step(d["kn"], d["ks"], 1.0, 1.0, disc_modes(np.array([lightest])))
     assert d["time_step_thesis"] == thesis_time_step(d["kn"], lightest)
     assert d["time_step"] == pytest.approx(0.9 * d["time_step_limit"])
     assert derived({"integration.safety": 0.5})["time_step"] == pytest.approx(0.5 * d["time_step_limit"])

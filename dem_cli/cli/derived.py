@@ -69,7 +69,7 @@ def derive(scenario: Scenario) -> Derived:
     lightest = float(mass.min())
     kn, ks = scenario.stiffness
     hn, hs = scenario.contact.damping()
-    dt, limit = choose_time_step(scenario, lightest)
+    dt, limit = choose_time_step(scenario, assembly)
     vp, vs = scenario.material.wave_speeds(scenario.grains.density, scenario.depth)
     stages = _plan(scenario, dt)
     steps = sum(stage.steps for stage in stages)

@@ -9,7 +9,7 @@ import pytest
 from few_grains import KN, MASS, RADIUS, Bench, G, few_grains, floor, run_for, segments, series
 
 from dem_cli.engines.explicit.lists import FINE
-from dem_cli.engines.explicit.timestep import critical_time_step, thesis_time_step
+from dem_cli.engines.explicit.timestep import critical_time_step, disc_modes, thesis_time_step
 
 OMEGA = math.sqrt(2.0 * KN / MASS)  # rad/s: a disc between two walls that both press on it
 SQUEEZE = 1e-3 * RADIUS
@@ -191,7 +191,7 @@ def test_limit_of_the_time_step_is_sharp(h, ks):
 @pytest.mark.parametrize("h", [0.0, 0.1, 0.3, 1.0])
 @pytest.mark.parametrize("ratio", [1.0, 0.5, 1.0 / 3.0])
 def test_engine_stays_below_the_limit_of_a_lattice(ratio, h):
-    found = critical_time_step(KN, ratio * KN, MASS, h, h)
+    found = critical_time_step(KN, ratio * KN, h, h, disc_modes(np.array([MASS])))
     assert 0.8 * lattice_limit(ratio * KN, h) < found < 1.001 * lattice_limit(ratio * KN, h)
 
 
@@ -199,5 +199,7 @@ def test_time_steps_in_closed_form():
     np.testing.assert_allclose(thesis_time_step(KN, MASS), 2.0 * math.pi * math.sqrt(MASS / KN) / 8.0, rtol=1e-14)
     # without dashpots 2/w of the fastest mode: w^2 = 8 kn/m for ks = kn/3
     np.testing.assert_allclose(
-        critical_time_step(KN, KN / 3.0, MASS, 0.0, 0.0), 2.0 / math.sqrt(8.0 * KN / MASS), rtol=1e-14
+        critical_time_step(KN, KN / 3.0, 0.0, 0.0, disc_modes(np.array([MASS]))),
+        2.0 / math.sqrt(8.0 * KN / MASS),
+        rtol=1e-14,
     )

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from engine_samples import box, engine_of, heavy, last_frame, loose_grains, soft
 
+from dem_cli.assembly import build_assembly
 from dem_cli.engines.explicit.timestep import choose_time_step
 from dem_cli.errors import RunError, ScenarioError
 from dem_cli.state import Frame, Grains
@@ -106,13 +107,13 @@ def test_the_grain_without_number_is_named() -> None:
 @pytest.mark.parametrize("share", [1.0001, 3.0])
 def test_a_step_beyond_the_limit_is_refused(share: float) -> None:
     scenario = soft()
-    m_min = 2480.0 * np.pi * 0.005**2
-    _, limit = choose_time_step(scenario, m_min)
+    assembly = build_assembly(scenario)
+    _, limit = choose_time_step(scenario, assembly)
     given = soft({"integration.time_step": f"{share * limit:.17g} s"})
     with pytest.raises(ScenarioError, match=rf"beyond the stability limit of {limit:.4g} s") as caught:
-        choose_time_step(given, m_min)
+        choose_time_step(given, assembly)
     assert caught.value.exit_code == 2
-    assert choose_time_step(soft({"integration.time_step": f"{0.9999 * limit:.17g} s"}), m_min)[0] < limit
+    assert choose_time_step(soft({"integration.time_step": f"{0.9999 * limit:.17g} s"}), assembly)[0] < limit
 
 
 # -- steps beyond the limit, which no scenario gets by ------------------------------------------------------------------

@@ -29,7 +29,7 @@ class ExplicitEngine:
 
     def __init__(self, scenario: Scenario, assembly: Assembly) -> None:
         self.scenario = scenario
-        self.time_step, _ = choose_time_step(scenario, float(assembly.grains.mass.min()))
+        self.time_step, _ = choose_time_step(scenario, assembly)
         self.gravity = gravity_of(scenario)
         self.state = ExplicitState.start_of(scenario, assembly, self.time_step)
         self.stage = 0
