@@ -61,16 +61,15 @@ def enlarged_overlap(dx, dy, mi, pi, qi, mj, pj, qj, along):
 
 
 @kernel(inline=True)
-def _contact(rows, outlines, pairs, k, law, lost):
-    """Law and memory of the pairs k..k+3: forces on the second body (x, y), turns of both over their radii, losses so far, lanes.
+def _approach(rows, outlines, pairs, k):
+    """Geometry and motion of the pairs k..k+3, lanes; their new normals are stored.
 
     g(n) = n.delta - h_i - h_j is developed about the old normal to the second order: its maximum is the gap, its place the new normal.
+    Returns nx, ny, overlap, closing, sliding, and the arms of normal and shear forces over the radius for both bodies.
     """
     dx, dy, du, dv = gather_difference(rows, pairs.first, pairs.second, k, X)
     mi, pi, qi, inverse_i = gather_thirds(outlines.fours, pairs.first, k)
     mj, pj, qj, inverse_j = gather_thirds(outlines.fours, pairs.second, k)
-    wi = gather_column(rows, pairs.first, k, Q) * inverse_i
-    wj = gather_column(rows, pairs.second, k, Q) * inverse_j
     nx, ny = load(pairs.nx, k), load(pairs.ny, k)
     hi, hi1, hi2 = support(mi, pi, qi, nx, ny)
     hj, hj1, hj2 = support(mj, pj, qj, nx, ny)
@@ -78,8 +77,8 @@ def _contact(rows, outlines, pairs, k, law, lost):
     slope = across - hi1 - hj1
     turn = slope / (along + hi2 + hj2)
     overlap = hi + hj - along - 0.5 * slope * turn
-    hi, hj = hi + turn * (hi1 + 0.5 * turn * hi2), hj + turn * (hj1 + 0.5 * turn * hj2)
-    hi1, hj1 = hi1 + turn * hi2, hj1 + turn * hj2
+    hi, hj = (hi + turn * (hi1 + 0.5 * turn * hi2)) * inverse_i, (hj + turn * (hj1 + 0.5 * turn * hj2)) * inverse_j
+    hi1, hj1 = (hi1 + turn * hi2) * inverse_i, (hj1 + turn * hj2) * inverse_j
     nx, ny = nx - turn * ny, ny + turn * nx
     scale = 1.5 - 0.5 * (nx * nx + ny * ny)
     nx, ny = nx * scale, ny * scale
@@ -87,8 +86,16 @@ def _contact(rows, outlines, pairs, k, law, lost):
     store(pairs.ny, k, ny)
     if outlines.enlarged:
         overlap = enlarged_overlap(dx, dy, mi, pi, qi, mj, pj, qj, dx * nx + dy * ny)
-    closing = -(du * nx + dv * ny) - (wi * hi1 + wj * hj1)
-    sliding = dv * nx - du * ny - (wi * hi + wj * hj)
+    spin_i, spin_j = gather_column(rows, pairs.first, k, Q), gather_column(rows, pairs.second, k, Q)
+    closing = -(du * nx + dv * ny) - (spin_i * hi1 + spin_j * hj1)
+    sliding = dv * nx - du * ny - (spin_i * hi + spin_j * hj)
+    return nx, ny, overlap, closing, sliding, hi1, hi, hj1, hj
+
+
+@kernel(inline=True)
+def _contact(pairs, k, approach, law, lost):
+    """Law and memory of the pairs k..k+3: forces on the second body (x, y), turns of both over their radii, losses so far, lanes."""
+    nx, ny, overlap, closing, sliding, normal_arm_i, arm_i, normal_arm_j, arm_j = approach
     spring = load(pairs.spring, k)
     normal, shear, stretched = contact_force(
         overlap, closing, sliding, spring, load(pairs.inertia_root, k), law.friction, law
@@ -102,22 +109,30 @@ def _contact(rows, outlines, pairs, k, law, lost):
     forces = (
         normal * nx + shear * ny,
         normal * ny - shear * nx,
-        (hi * shear + hi1 * normal) * inverse_i,
-        (hj * shear + hj1 * normal) * inverse_j,
+        arm_i * shear + normal_arm_i * normal,
+        arm_j * shear + normal_arm_j * normal,
     )
     return forces, (lost[0] + n, lost[1] + s, lost[2] + f, lost[3] + c)
 
 
 @kernel()
 def ellipse_pair_forces(rows, outlines, pairs, begin, end, law, losses):
-    """Forces of the pairs begin..end-1 of ellipses on their grains; rows, memory and losses change in place as in `pair_forces`."""
+    """Forces of the pairs begin..end-1 of ellipses on their grains; rows, memory and losses change in place as in `pair_forces`.
+
+    The next group's geometry is under way while this one's law waits for its results.
+    """
     if begin == end:
         return
     zero = spread(0.0)
     lost = (zero, zero, zero, zero)
-    for k in range(begin, end, WIDTH):
-        forces, lost = _contact(rows, outlines, pairs, k, law, lost)
+    coming = _approach(rows, outlines, pairs, begin)
+    for k in range(begin, end - WIDTH, WIDTH):
+        later = _approach(rows, outlines, pairs, k + WIDTH)
+        forces, lost = _contact(pairs, k, coming, law, lost)
         scatter_wrench(rows, pairs.first, pairs.second, k, FX, *forces)
+        coming = later
+    forces, lost = _contact(pairs, end - WIDTH, coming, law, lost)
+    scatter_wrench(rows, pairs.first, pairs.second, end - WIDTH, FX, *forces)
     for m in range(4):
         a, b, c, d = unpack(lost[m])
         losses[m] += a + b + c + d
