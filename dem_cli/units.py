@@ -67,6 +67,8 @@ KINDS: dict[str, tuple[str, str]] = {
     "kg/m^3": ("density", "2480 kg/m^3"),
     "N": ("force", "10 N"),
     "N/m": ("stiffness", "1e8 N/m"),
+    "N s/m": ("viscosity", "1e8 N s/m"),
+    "N m s": ("rotational viscosity", "1e4 N m s"),
     "Pa": ("stress", "15 kPa"),
     "J": ("energy", "1 J"),
     "": ("plain number", "0.5"),

@@ -25,7 +25,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "jit": set(),
     "units": {"errors"},
     "state": {"errors"},
-    "scenario": BASE,
+    "scenario": BASE | {"geometry"},
     "geometry": {"jit"},
     "assembly": STARTS | {"geometry", "jit"},
     "engines": STARTS | {"assembly", "geometry", "jit"},

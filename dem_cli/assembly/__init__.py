@@ -27,4 +27,5 @@ class Assembly:
 def build_assembly(scenario: Scenario) -> Assembly:
     """Grains and walls of a scenario; the same seed gives the same assembly. ScenarioError if a packing file is wrong."""
     generator = np.random.default_rng(scenario.seed)
-    return Assembly(place_grains(scenario, generator), build_walls(scenario))
+    grains, bonds = place_grains(scenario, generator)
+    return Assembly(grains, build_walls(scenario), bonds, rigid=scenario.grains.shape == "clump")

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from dem_cli.assembly.shapes import build_grains, draw_sizes
 from dem_cli.scenario import Scenario
-from dem_cli.state import Floats, Grains
+from dem_cli.state import Bonds, Floats, Grains
 
 
-def place_grains(scenario: Scenario, generator: np.random.Generator) -> Grains:
-    """The grains of a scenario before the first step, at rest unless their file gives velocities."""
-    density, depth = scenario.grains.density, scenario.depth
+def place_grains(scenario: Scenario, generator: np.random.Generator) -> tuple[Grains, Bonds]:
+    """The grains of a scenario before the first step, and their bonds, at rest unless their file gives velocities."""
+    sizes = draw_sizes(scenario, generator)
     if scenario.packing.file:
         file = scenario.grain_file()
-        grains = Grains.discs(file.x, file.y, file.radius, density, depth)
-        return replace(grains, vx=file.vx.copy(), vy=file.vy.copy())
-    count, grid = scenario.grain_count, scenario.packing.grid
+        return build_grains(scenario, sizes, file.x, file.y, file.vx, file.vy, file.spin)
+    grid = scenario.packing.grid
     assert grid is not None
-    assert scenario.grains.radius is not None
-    radius = scenario.grains.radius.draw(generator, count)
-    x, y = staggered_grid(count, grid.columns, grid.spacing, grid.row_spacing, grid.shift)
-    return Grains.discs(x, y, radius, density, depth)
+    x, y = staggered_grid(len(sizes), grid.columns, grid.spacing, grid.row_spacing, grid.shift)
+    return build_grains(scenario, sizes, x, y)
 
 
 def staggered_grid(count: int, columns: int, spacing: float, row_spacing: float, shift: float) -> tuple[Floats, Floats]:

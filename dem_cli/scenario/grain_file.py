@@ -1,4 +1,4 @@
-"""CSV files of grains: header x,y,r or x,y,r,vx,vy, one grain a line, lines of # are comments."""
+"""CSV files of grains: header x,y,r and, as wanted, vx,vy, angle, aspect, spin; one grain a line, lines of # are comments."""
 
 from __future__ import annotations
 
@@ -14,17 +14,25 @@ from dem_cli.errors import ScenarioError
 
 Floats = npt.NDArray[np.float64]
 SCALE = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+LENGTHS = ("x", "y", "r", "vx", "vy")
+COLUMNS = (*LENGTHS, "angle", "aspect", "spin")
 
 
 @dataclass(frozen=True)
 class GrainFile:
-    """Centres x, y [m], radii [m] and velocities vx, vy [m/s] of the grains of a file, shape (n,) each."""
+    """The grains of a file, shape (n,) each: centres of mass x, y [m], radii [m], velocities vx, vy [m/s], spin [rad/s].
+
+    angle [rad] and aspect [-] (longer over shorter semi-axis of an ellipse) are None where the file does not have them.
+    """
 
     x: Floats
     y: Floats
     radius: Floats
     vx: Floats
     vy: Floats
+    spin: Floats
+    angle: Floats | None
+    aspect: Floats | None
 
 
 def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
@@ -39,9 +47,11 @@ def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
     if not numbered:
         raise ScenarioError(f"{path}: is empty. Begin with the header x,y,r")
     header = [name.strip() for name in numbered[0][1].split(",")]
-    if not {"x", "y", "r"} <= set(header) <= {"x", "y", "r", "vx", "vy"} or ("vx" in header) != ("vy" in header):
+    given = set(header)
+    if not {"x", "y", "r"} <= given <= set(COLUMNS) or ("vx" in given) != ("vy" in given) or len(given) < len(header):
         raise ScenarioError(
-            f"{path}: line {numbered[0][0]}: the header is {','.join(header)}. Write x,y,r or x,y,r,vx,vy"
+            f"{path}: line {numbered[0][0]}: the header is {','.join(header)}. "
+            "Write x,y,r or x,y,r,vx,vy, each once; angle, aspect and spin may follow"
         )
     rows = []
     for (number, _), cells in zip(numbered[1:], csv.reader(text for _, text in numbered[1:]), strict=True):
@@ -53,10 +63,12 @@ def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
             ) from None
         if not all(map(math.isfinite, values.values())) or values["r"] <= 0.0:
             raise ScenarioError(f"{path}: line {number}: a number is not finite or r is not above 0. Correct the line")
+        if not 1.0 <= values.get("aspect", 1.0) <= 5.0:
+            raise ScenarioError(f"{path}: line {number}: the aspect ratio is not from 1 to 5. Correct the line")
         rows.append(values)
     if not rows:
         raise ScenarioError(f"{path}: holds no grains. Add one grain a line")
-    column = {
-        name: np.array([row.get(name, 0.0) for row in rows]) * SCALE[unit] for name in ("x", "y", "r", "vx", "vy")
-    }
-    return GrainFile(column["x"], column["y"], column["r"], column["vx"], column["vy"])
+    column = {name: np.array([row.get(name, 0.0) for row in rows]) for name in COLUMNS}
+    x, y, radius, vx, vy = (column[name] * SCALE[unit] for name in LENGTHS)
+    angle = np.radians(column["angle"]) if "angle" in given else None
+    return GrainFile(x, y, radius, vx, vy, column["spin"], angle, column["aspect"] if "aspect" in given else None)

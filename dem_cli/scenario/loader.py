@@ -14,6 +14,7 @@ from dem_cli.scenario import mistakes
 from dem_cli.scenario.grain_file import SCALE, read_grain_file
 from dem_cli.scenario.model import Scenario, tracked_exist
 from dem_cli.scenario.overrides import apply_overrides
+from dem_cli.scenario.table import NOTHING
 
 
 def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -85,7 +86,17 @@ def _packing_file(
     if count is not None and count != len(grains.x):
         rule = f"differs from the {len(grains.x)} grains of {name}"
         found.append((("grains", "count"), count, rule, "Leave count out: the file gives it"))
+    shape, ratio = scenario.grains.shape, scenario.grains.aspect_ratio
+    if grains.aspect is not None and shape != "ellipse":
+        rule = f'has a column aspect, which is none of shape = "{shape}"'
+        found.append((("packing", "file"), name, rule, 'Leave the column out, or write shape = "ellipse"'))
+    elif grains.aspect is not None and ratio:
+        rule = f"contradicts the column aspect of {name}"
+        found.append((("grains", "aspect_ratio"), raw["grains"]["aspect_ratio"], rule, "Leave one of them out"))
+    elif shape == "ellipse" and grains.aspect is None and not ratio:
+        remedy = f"Add for example aspect_ratio = 2, or a column aspect to {name}"
+        found.append((("grains", "aspect_ratio"), NOTHING, "is missing", remedy))
     if scenario.output.tracks:
-        ids = list(scenario.output.tracks.grains)
-        found += [(m.loc, ids, m.rule, m.remedy) for m in tracked_exist(scenario.output, len(grains.x))]
+        ids, count = list(scenario.output.tracks.grains), len(grains.x) * scenario.grains.elements
+        found += [(m.loc, ids, m.rule, m.remedy) for m in tracked_exist(scenario.output, count)]
     return found

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import PrivateAttr
 
+from dem_cli.scenario.extent import largest_reach
 from dem_cli.scenario.grain_file import GrainFile, read_grain_file
 from dem_cli.scenario.quantities import Length, Whole
 from dem_cli.scenario.stages import Stage
@@ -42,6 +43,18 @@ class Scenario(Table):
     short_form: ClassVar = None
 
     @classmethod
+    def spell_out(cls, raw: Any) -> Any:
+        """Gives ellipses the default of `ellipse_test`, which other shapes do not have."""
+        grains, contact = (raw.get(name) if isinstance(raw, dict) else None for name in ("grains", "contact"))
+        if not isinstance(grains, dict) or not isinstance(contact, dict) or grains.get("shape") != "ellipse":
+            return raw
+        return raw | {"contact": {"ellipse_test": "exact"} | contact}
+
+    @classmethod
+    def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
+        return [("contact", "ellipse_test")] if tuple(path) == ("grains", "shape") and value != "ellipse" else []
+
+    @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
         good = given.good
         if good.get("stages") == ():
@@ -49,11 +62,15 @@ class Scenario(Table):
         grains, packing, container = (good.get(name) for name in ("grains", "packing", "container"))
         if grains and packing:
             yield from _where_sizes_come_from(grains, packing)
+        contact = good.get("contact")
+        if grains and contact and contact.ellipse_test and grains.shape != "ellipse":
+            rule = f'is no key of shape = "{grains.shape}"'
+            yield Mistake(("contact", "ellipse_test"), rule, 'Leave it out, or write shape = "ellipse"')
         if packing and packing.grid and container:
             yield from _grid_fits(grains, packing, container)
         output = good.get("output")
         if grains and packing and output and output.tracks and not packing.file:
-            yield from tracked_exist(output, _count(grains))
+            yield from tracked_exist(output, _count(grains) * grains.elements)
 
     @property
     def source(self) -> str:
@@ -71,8 +88,13 @@ class Scenario(Table):
 
     @property
     def grain_count(self) -> int:
-        """Number of grains, wherever it is given."""
+        """Number of grains, wherever it is given; a grain of several discs is one."""
         return len(self.grain_file().x) if self.packing.file else _count(self.grains)
+
+    @property
+    def element_count(self) -> int:
+        """Number of discs and ellipses that the grains are made of, which is what ids count."""
+        return self.grain_count * self.grains.elements
 
     @property
     def stiffness(self) -> tuple[float, float]:
@@ -118,6 +140,8 @@ def _where_sizes_come_from(grains: Grains, packing: Packing) -> Iterator[Mistake
         if grains.radius:
             yield Mistake(("grains", "radius"), "contradicts packing.file, which gives the radii", "Leave radius out")
         return
+    if grains.shape == "ellipse" and not grains.aspect_ratio:
+        yield Mistake(("grains", "aspect_ratio"), "is missing", "Add for example aspect_ratio = 2")
     if not grains.radius:
         yield Mistake(("grains", "radius"), "is missing", 'Add for example radius = { uniform = ["0.5 cm", "1 cm"] }')
     if not _count(grains):
@@ -136,11 +160,16 @@ def _grid_fits(grains: Grains | None, packing: Packing, container: Container) ->
         yield Mistake(("container", "width"), rule, f"Widen it, or take {advice}")
     if not grains or not grains.radius:
         return
-    largest = 2.0 * grains.radius.bounds[1]
-    for name in ("spacing", "row_spacing") if grid.row_spacing != grid.spacing else ("spacing",):
-        if largest > getattr(grid, name) * (1.0 + 1e-9):
-            rule = f"is smaller than the largest grain, which is {largest:.6g} m across"
-            yield Mistake(("packing", "grid", name), rule, "Widen the grid, so that grains start apart")
+    across, high = (2.0 * reach for reach in largest_reach(grains))
+    said = 'Widen the grid, so that grains start apart, or bound their orientation: { uniform = ["-30 deg", "30 deg"] }'
+    remedy = "Widen the grid, so that grains start apart" if grains.shape == "disc" else said
+    for name, needed in (("spacing", across), ("row_spacing", high)):
+        if name == "row_spacing" and grid.row_spacing == grid.spacing and across > grid.spacing * (1.0 + 1e-9):
+            continue  # said already
+        if needed > getattr(grid, name) * (1.0 + 1e-9):
+            sense = "high" if name == "row_spacing" and high != across else "across"
+            rule = f"is smaller than the largest grain, which is {needed:.6g} m {sense}"
+            yield Mistake(("packing", "grid", name), rule, remedy)
     if container.lid and container.height and (count := _count(grains)):
         top = grid.rows(count) * grid.row_spacing
         if top > container.height * (1.0 + 1e-9):
@@ -149,8 +178,8 @@ def _grid_fits(grains: Grains | None, packing: Packing, container: Container) ->
 
 
 def tracked_exist(output: Output, count: int) -> Iterator[Mistake]:
-    """The tracked grains are among the `count` grains."""
+    """The tracked ids are among the `count` discs and ellipses."""
     assert output.tracks is not None
     if count and (beyond := [k for k in output.tracks.grains if k >= count]):
-        rule = f"names grain {beyond[0]}, but there are only {count} grains and ids count from 0"
+        rule = f"names grain {beyond[0]}, but there are only {count} ids, which count from 0"
         yield Mistake(("output", "tracks", "grains"), rule, f"The last id is {count - 1}")

@@ -27,7 +27,7 @@ def apply_overrides(raw: dict[str, Any], overrides: Iterable[str]) -> list[str]:
 
     VALUE is read as TOML where that works (0.3, true, [1, 2]) and is text elsewhere (400 gal). Stages are counted from 1
     (stage.2.amplitude), or named by kind or name (stage.shake.amplitude); the number may be left out where only one stage knows
-    the key. A key displaces those that exclude it: cycles takes the place of duration.
+    the key. A key displaces those that exclude it: cycles takes the place of duration, and a shape drops the keys of others.
     """
     said = []
     for override in overrides:
@@ -79,10 +79,22 @@ def _set(table: type[Table], raw: dict[str, Any], parts: list[str], value: Any, 
         content = dict(content) if isinstance(content, dict) else {}
         _set(inner, content, rest, value, [*before, name])
         raw[name] = content
+    for path in table.displaced(parts, value):
+        _drop(raw, path)
     for group in table.alternatives:
         if any(name in option for option in group):
             for rival in (k for option in group if name not in option for k in option):
                 raw.pop(rival, None)
+
+
+def _drop(raw: dict[str, Any], path: tuple[str, ...]) -> None:
+    """Leaves out the key at `path`, if it is there."""
+    *parents, last = path
+    table: Any = raw
+    for parent in parents:
+        table = table.get(parent) if isinstance(table, dict) else None
+    if isinstance(table, dict):
+        table.pop(last, None)
 
 
 def _table_of(table: type[Table], name: str) -> type[Table] | None:

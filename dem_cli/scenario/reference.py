@@ -83,10 +83,15 @@ def _rows(table: type[Table], before: str, top: bool = False) -> Iterator[tuple[
 
 
 def _table(field: FieldInfo) -> type[Table] | None:
-    for kind in (field.annotation, *typing.get_args(field.annotation)):
+    """The table that a key holds, also in a list."""
+
+    def walk(kind: Any) -> Iterator[type[Table]]:
         if isinstance(kind, type) and issubclass(kind, Table):
-            return kind
-    return None
+            yield kind
+        for inner in typing.get_args(kind):
+            yield from walk(inner)
+
+    return next(walk(field.annotation), None)
 
 
 def _value(field: FieldInfo, inner: type[Table] | None) -> str:
@@ -109,14 +114,20 @@ def _value(field: FieldInfo, inner: type[Table] | None) -> str:
     elif words:
         return " or ".join(f'`"{w}"`' for w in words)
     else:
-        said = "`true` or `false`" if field.annotation is bool else "text"
+        said = "`true` or `false`" if bool in map(_bare, _parts(field.annotation)) else "text"
         example = "" if said != "text" else example
-    many = typing.get_origin(next(iter(_parts(field.annotation)))) is tuple
-    return _cell((f"list of: {said}" if many else said) + example)
+    return _cell("list of: " * _depth(field.annotation) + said + example)
+
+
+def _depth(kind: Any) -> int:
+    """How many lists are around a value: 1 for a list, 2 for a list of lists."""
+    first = _bare(next(iter(_parts(kind))))
+    return 1 + _depth(typing.get_args(first)[0]) if typing.get_origin(first) is tuple else 0
 
 
 def _short(table: type[Table]) -> str:
-    return "length" if (table.short_form or {}).get("type") == "string" else "number"
+    usual = "length" if (table.short_form or {}).get("type") == "string" else "number"
+    return table.short_words or usual
 
 
 def _parts(kind: Any) -> list[Any]:
@@ -124,6 +135,11 @@ def _parts(kind: Any) -> list[Any]:
     if isinstance(kind, types.UnionType) or typing.get_origin(kind) is typing.Union:
         return [one for one in typing.get_args(kind) if one is not type(None)]
     return [kind]
+
+
+def _bare(kind: Any) -> Any:
+    """A type without what it is annotated with."""
+    return typing.get_args(kind)[0] if typing.get_origin(kind) is typing.Annotated else kind
 
 
 def _bounds(field: FieldInfo) -> Iterator[Range]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import copy
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import (
@@ -72,6 +72,8 @@ class Table(BaseModel):
     alternatives: ClassVar[tuple[tuple[tuple[str, ...], ...], ...]] = ()
     # JSON Schema of the short form that `spell_out` understands.
     short_form: ClassVar[JsonSchema | None] = None
+    # What the manual calls it, where its type does not say.
+    short_words: ClassVar[str | None] = None
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
@@ -83,6 +85,12 @@ class Table(BaseModel):
         """Rules between keys."""
         del given
         yield from ()
+
+    @classmethod
+    def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
+        """Keys, from this table's own level, that an override of the key at `path` by `value` leaves without meaning."""
+        del path, value
+        return []
 
     @model_validator(mode="wrap")
     @classmethod

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Strict
@@ -25,29 +25,69 @@ from dem_cli.scenario.quantities import (
 )
 from dem_cli.scenario.radii import Radius
 from dem_cli.scenario.restitution import Tension, damping_ratio
+from dem_cli.scenario.shapes import AspectRatio, Bond, Orientation, Template
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
 Friction = Annotated[float, Number(ge=0.0)]
 Ratio = Annotated[float, Number(ge=0.0)]
 Share = Annotated[float, Number(ge=0.0, lt=1.0)]
 SIDES = ("left", "right", "bottom", "top")
+TEMPLATED = ("bonded", "clump")
+# Keys of [grains] that only some shapes have.
+SHAPES_OF = {
+    "aspect_ratio": ("ellipse",),
+    "orientation": ("ellipse", *TEMPLATED),
+    "template": TEMPLATED,
+    "equal_area": TEMPLATED,
+    "bond": ("bonded",),
+}
 
 
 class Grains(Table):
     """The grains. With a packing from a file, count and radius come from there."""
 
-    shape: Literal["disc"] = key("disc", "outline of the grains", example="disc")
+    shape: Literal["disc", "ellipse", "bonded", "clump"] = key(
+        "disc",
+        "outline of the grains: discs, ellipses, several discs held together by viscous bonds, or several discs as one rigid body",
+        example="disc",
+    )
     count: Annotated[int, Whole(ge=1)] | None = key(
         None, "number of grains; may be left out with a list of radii or a file", example=3000
     )
     density: Density = key(doc="density of the solid", example="2480 kg/m^3")
     radius: Radius | None = key(
-        None, "radii: one length, or a distribution (table grains.radius)", example={"uniform": ["0.5 cm", "1 cm"]}
+        None,
+        "radii: one length, or a distribution (table grains.radius). Of ellipses it is sqrt(a b), that of the disc of equal area; "
+        "of templates the unit in which they are written",
+        example={"uniform": ["0.5 cm", "1 cm"]},
+    )
+    aspect_ratio: AspectRatio | None = key(
+        None, "ellipses: longer over shorter semi-axis, a = r sqrt(k), b = r/sqrt(k)", example=2.0
+    )
+    orientation: Orientation | None = key(
+        maker=lambda good: None if good["shape"] == "disc" else "random",
+        doc="all but discs: angle at the start (default: random, of any angle); a file's own angles come first",
+        example="random",
+    )
+    template: Template | None = key(
+        maker=lambda good: "pair" if good["shape"] in TEMPLATED else None,
+        doc="bonded and clump: the discs of a grain, in units of its radius (default: pair)",
+        example="pair",
+    )
+    equal_area: Annotated[bool, Strict()] | None = key(
+        maker=lambda good: False if good["shape"] in TEMPLATED else None,
+        doc="bonded and clump: scale the template so that a grain has the area pi r^2 of a disc of its radius (default: false)",
+        example=True,
+    )
+    bond: Bond | None = key(
+        maker=lambda good: {} if good["shape"] == "bonded" else None,
+        doc="bonded: what holds the discs of a grain together",
+        example={"normal": "stiff", "tangential": "stiff", "rolling": True},
     )
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
-        good = given.good
+        raw, good = given
         count, radius = good.get("count"), good.get("radius")
         if radius and radius.sizes and count is not None and count != len(radius.sizes):
             yield Mistake(
@@ -55,6 +95,26 @@ class Grains(Table):
                 f"differs from the {len(radius.sizes)} radii of the list",
                 "Leave count out, or make them agree",
             )
+        for name in SHAPES_OF if "shape" in good else ():
+            if name in raw and good["shape"] not in SHAPES_OF[name]:
+                shapes = " or ".join(f'"{shape}"' for shape in SHAPES_OF[name])
+                yield Mistake(
+                    (name,), f'is no key of shape = "{good["shape"]}"', f"Leave it out, or write shape = {shapes}"
+                )
+
+    @classmethod
+    def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
+        return [(name,) for name in SHAPES_OF if tuple(path) == ("shape",) and value not in SHAPES_OF[name]]
+
+    @property
+    def elements(self) -> int:
+        """Discs or ellipses that a grain is made of."""
+        return len(self.template.outline()[0]) if self.template else 1
+
+    @property
+    def scale(self) -> float:
+        """Length of a unit of the template over the grain's radius."""
+        return math.sqrt(math.pi / self.template.area) if self.template and self.equal_area else 1.0
 
 
 class Material(Table):
@@ -151,6 +211,11 @@ class Contact(Table):
         "what friction limits: spring and dashpot together, or the spring alone, thesis (2.16)",
         example="total",
     )
+    ellipse_test: Literal["exact", "enlarged"] | None = key(
+        None,
+        "ellipses: exact geometry of the two outlines (default), or the enlarged ellipse of thesis (4.32), which misses some contacts",
+        example="exact",
+    )
 
     ellipse_test: Literal["exact", "enlarged"] = key(
         "exact",
@@ -228,7 +293,8 @@ class Packing(Table):
     grid: Grid | None = key(None, "starting grid", example={"columns": 40, "spacing": "3 cm"})
     file: str | None = key(
         None,
-        "CSV file beside the scenario, with header x,y,r or x,y,r,vx,vy: centres, radii, velocities (per second)",
+        "CSV file beside the scenario, a grain a line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), "
+        "angle (degrees), spin (rad/s) and, for ellipses, aspect (a/b) may follow",
         example="grains.csv",
     )
     file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")
@@ -266,7 +332,10 @@ class Integration(Table):
 class Tracks(Table):
     """Grains that are followed closely."""
 
-    grains: tuple[Annotated[int, Whole(ge=0)], ...] = key(doc="their ids; ids count from 0", example=[484, 499, 514])
+    grains: tuple[Annotated[int, Whole(ge=0)], ...] = key(
+        doc="their ids, counted from 0; each disc of a bonded grain or clump has its own, grain after grain",
+        example=[484, 499, 514],
+    )
     interval: Duration = key("1 ms", "time between records", example="1 ms")
 
     @classmethod
