@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -56,9 +57,7 @@ def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
     )
     lines = [
         ("scenario", f"{d.title}  (hash {d.hash}, seed {scenario.seed})"),
-        ("grains", f"{d.grains} discs, total mass {human(d.total_mass, 'kg')} at depth {human(scenario.depth, 'm')}"),
-        ("  radius", f"{spread(d.radius, 'm')}  (smallest, mean, largest)"),
-        ("  mass", spread(d.mass, "kg")),
+        *grain_rows(scenario, d),
         (
             "  expected fill",
             f"depth {human(d.depth_expected, 'm')}, overlap at the floor {d.overlap_expected:.1e} of a radius",
@@ -87,9 +86,50 @@ def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
         ("expected", f"{counted(d.steps)} steps, result file {human(d.file_bytes, 'B', 2)}"),
         (
             "  run time",
-            f"{clock(d.run_seconds)} at {RATE_GRAIN_STEPS / 1e6:.0f} million grain-steps per second (one core)",
+            f"{clock(d.run_seconds)} at {RATE_GRAIN_STEPS[d.shape] / 1e6:.0f} million grain-steps per second (one core)",
         ),
     ]
+
+
+def grain_rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
+    """Label and text of the lines on grains, as their shape needs them."""
+    counts = {"disc": f"{d.grains} discs", "ellipse": f"{d.grains} ellipses"}
+    words = {"bonded": "bonded grains", "clump": "rigid clumps"}
+    count = counts.get(d.shape) or f"{d.grains} {words[d.shape]} of {d.elements // d.grains} discs, {d.elements} in all"
+    lines = [
+        ("grains", f"{count}, total mass {human(d.total_mass, 'kg')} at depth {human(scenario.depth, 'm')}"),
+        (
+            "  radius",
+            f"{spread(d.radius, 'm')}  (smallest, mean, largest{', of the discs' if d.template_area else ''})",
+        ),
+    ]
+    if d.semi_major and d.semi_minor:
+        lines += [("  semi-axis a", spread(d.semi_major, "m")), ("  semi-axis b", spread(d.semi_minor, "m"))]
+    if d.template_area:
+        areas = ", ".join(f"{1e4 * area:.4g}" for area in d.area)
+        times = d.template_area / math.pi
+        lines.append(("  area", f"{areas} cm^2  (of whole grains: {times:.4g} pi r^2, r the radius of [grains])"))
+    lines.append(("  mass", spread(d.mass, "kg") + ("  (of whole grains)" if d.template_area else "")))
+    if d.bond_normal and d.bond_tangential and d.bond_rolling and d.bond_lambda:
+        rolling = (
+            scientific(d.bond_rolling, "N m s") if scenario.grains.bond and scenario.grains.bond.rolling else "free"
+        )
+        lines += [
+            ("bonds", f"{d.bonds}: normal {scientific(d.bond_normal, 'N s/m')}"),
+            ("  tangential", scientific(d.bond_tangential, "N s/m")),
+            ("  rolling", rolling),
+            (
+                "  lambda",
+                f"C dt/m_eff from {d.bond_lambda[0]:.3g} to {d.bond_lambda[2]:.3g}  (implicit: any is stable)",
+            ),
+            ("  expected creep", f"{d.bond_creep:.1e} of a radius under the weight of the bed"),
+        ]
+    return lines
+
+
+def scientific(values: tuple[float, float, float], unit: str) -> str:
+    """Smallest and largest with exponents."""
+    return f"{values[0]:.3e} {unit}" if values[0] == values[2] else f"from {values[0]:.3e} to {values[2]:.3e} {unit}"
 
 
 def human(value: float, unit: str, digits: int = 4) -> str:

@@ -6,13 +6,17 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from dem_cli.scenario import Scenario, Settle
 from dem_cli.scenario.restitution import restitution
+from dem_cli.state import Floats
 
-# One core; a usual run with output, see the benchmark in README.
-RATE_GRAIN_STEPS = 40e6
+# Discs or ellipses times steps a second, by shape: one core; a usual run with output, see the benchmark in README.
+RATE_GRAIN_STEPS = {"disc": 40e6, "ellipse": 12e6, "bonded": 24e6, "clump": 24e6}
 SERIES_COLUMNS = 46  # numbers of a row of /series, 8 bytes each
-POROSITY = 0.18  # of a bed of discs that has fallen into place; for estimates only
+POROSITY = 0.18  # of a bed that has fallen into place; for estimates only
+Spread = tuple[float, float, float]  # smallest, mean, largest
 
 
 @dataclass(frozen=True)
@@ -29,14 +33,31 @@ class StagePlan:
 
 @dataclass(frozen=True)
 class Derived:
-    """Derived numbers in SI units. `radius` and `mass` are (smallest, mean, largest)."""
+    """Derived numbers in SI units, None where they do not belong to the shape; a spread is (smallest, mean, largest).
+
+    `elements` are the discs and ellipses that grains are made of, `radius` is theirs; `area` and `mass` are those of whole grains.
+    `template_area` is in units of `radius` squared. `bond_lambda` is C dt/m_eff of the normal viscosity; `bond_creep` how far bonds give in the
+    expected time under the weight of the bed, over the mean radius.
+    """
 
     title: str
     hash: str
+    shape: str
     grains: int
-    radius: tuple[float, float, float]
-    mass: tuple[float, float, float]
+    elements: int
+    radius: Spread
+    semi_major: Spread | None
+    semi_minor: Spread | None
+    template_area: float | None
+    area: Spread
+    mass: Spread
     total_mass: float
+    bonds: int
+    bond_normal: Spread | None
+    bond_tangential: Spread | None
+    bond_rolling: Spread | None
+    bond_lambda: Spread | None
+    bond_creep: float | None
     vp: float
     vs: float
     kn: float
@@ -65,22 +86,40 @@ def derive(scenario: Scenario) -> Derived:
     from dem_cli.engines.explicit.timestep import choose_time_step, thesis_time_step
 
     assembly = build_assembly(scenario)
-    radius, mass = assembly.grains.radius, assembly.grains.mass
-    lightest = float(mass.min())
+    elements, bonds = assembly.grains, assembly.bonds
+    radius, mass = elements.radius, np.bincount(elements.body, elements.mass).astype(float)
+    lightest = float(elements.mass.min())
     kn, ks = scenario.stiffness
     hn, hs = scenario.contact.damping()
     dt, limit = choose_time_step(scenario, assembly)
     vp, vs = scenario.material.wave_speeds(scenario.grains.density, scenario.depth)
     stages = _plan(scenario, dt)
     steps = sum(stage.steps for stage in stages)
-    depth, overlap = _under_own_weight(scenario, float(mass.sum()), float(radius.mean()), kn)
+    seconds = sum(stage.expected for stage in stages)
+    depth, force = _under_own_weight(scenario, float(mass.sum()), float(radius.mean()))
+    overlap = force / kn / float(radius.mean())
+    shape, template = scenario.grains.shape, scenario.grains.template
+    creep = seconds * force / float(bonds.normal.min()) / float(radius.mean()) if len(bonds) else None
+    reduced = elements.mass[bonds.i] * elements.mass[bonds.j] / (elements.mass[bonds.i] + elements.mass[bonds.j])
     return Derived(
         title=scenario.title,
         hash=scenario.hash,
-        grains=len(radius),
-        radius=(float(radius.min()), float(radius.mean()), float(radius.max())),
-        mass=(lightest, float(mass.mean()), float(mass.max())),
+        shape=shape,
+        grains=len(mass),
+        elements=len(elements),
+        radius=_spread(radius),
+        semi_major=_spread(elements.a) if shape == "ellipse" else None,
+        semi_minor=_spread(elements.b) if shape == "ellipse" else None,
+        template_area=template.area * scenario.grains.scale**2 if template else None,
+        area=_spread(mass / (scenario.grains.density * scenario.depth)),
+        mass=_spread(mass),
         total_mass=float(mass.sum()),
+        bonds=len(bonds),
+        bond_normal=_spread(bonds.normal) if len(bonds) else None,
+        bond_tangential=_spread(bonds.tangential) if len(bonds) else None,
+        bond_rolling=_spread(bonds.rolling) if len(bonds) else None,
+        bond_lambda=_spread(bonds.normal * dt / reduced) if len(bonds) else None,
+        bond_creep=creep,
         vp=vp,
         vs=vs,
         kn=kn,
@@ -95,14 +134,20 @@ def derive(scenario: Scenario) -> Derived:
         time_step_thesis=thesis_time_step(kn, lightest),
         stages=stages,
         steps=steps,
-        file_bytes=file_bytes(scenario, len(radius), sum(stage.expected for stage in stages)),
-        run_seconds=steps * len(radius) / RATE_GRAIN_STEPS,
-        warnings=_warnings(scenario, overlap),
+        file_bytes=file_bytes(scenario, len(elements), seconds),
+        run_seconds=steps * len(elements) / RATE_GRAIN_STEPS[shape],
+        warnings=_warnings(scenario, overlap, creep),
     )
 
 
+def _spread(values: Floats) -> Spread:
+    """Smallest, mean and largest; the mean of equal values is exactly their value."""
+    low, high = float(values.min()), float(values.max())
+    return low, min(max(float(values.mean()), low), high), high
+
+
 def file_bytes(scenario: Scenario, grains: int, seconds: float) -> int:
-    """Expected size of the result file.
+    """Expected size of the result file; grains: number of discs and ellipses.
 
     A frame: 67 bytes for each grain and each point where a grain touches a wall, 88 for each contact (results/vtkhdf.py), and 4 to
     number each grain; a settled bed of discs has 1.8 contacts a grain. A row of the series: 8 bytes for each of its quantities
@@ -137,20 +182,24 @@ def _settling_time(scenario: Scenario, *, first: bool) -> float:
     return math.sqrt(2.0 * grid.rows(scenario.grain_count) * grid.row_spacing / gravity) + 0.4
 
 
-def _under_own_weight(scenario: Scenario, mass: float, radius: float, kn: float) -> tuple[float, float]:
-    """Expected fill depth [m], and overlap at the floor over the mean radius if every grain there carries its share."""
+def _under_own_weight(scenario: Scenario, mass: float, radius: float) -> tuple[float, float]:
+    """Expected fill depth [m], and force [N] on a disc or ellipse at the floor if every one there carries its share."""
     solid = mass / (scenario.grains.density * scenario.depth)
     width = scenario.container.width
     force = mass * scenario.container.gravity * min(1.0, 2.0 * radius / width)
-    return solid / (1.0 - POROSITY) / width, force / kn / radius
+    return solid / (1.0 - POROSITY) / width, force
 
 
-def _warnings(scenario: Scenario, overlap: float) -> list[str]:
+def _warnings(scenario: Scenario, overlap: float, creep: float | None) -> list[str]:
     """What is allowed but seldom meant."""
     said = []
     if overlap > 0.01:
         said.append(
             f"grains at the floor will overlap by about {overlap:.1%} of their radius: the stiffness may be too low"
+        )
+    if creep is not None and creep > 0.01:
+        said.append(
+            f"bonds at the floor will give by about {creep:.1%} of a radius under the weight of the bed: raise their viscosities"
         )
     for number, stage in enumerate(scenario.stages, 1):
         if stage.kind != "shake":
