@@ -58,12 +58,10 @@ def _radical_lines(x: Floats, y: Floats, radius: Floats, k: int) -> list[Line] |
             continue
         dx, dy = float(x[j] - x[k]), float(y[j] - y[k])
         distance, other = math.hypot(dx, dy), float(radius[j])
-        if distance + r <= other:
-            # Inside disc j; of two equal discs the first keeps the piece.
-            if distance > 0.0 or r < other or j < k:
-                return None
-            continue
-        if distance >= r + other or distance + other <= r:
+        within, around = distance + r <= other, distance + other <= r
+        if within and not (around and k < j):  # of discs that are the same but for rounding the first keeps the piece
+            return None
+        if around or distance >= r + other:
             continue
         # (distance^2 + r^2 - other^2) / (2 distance), without loss where the discs hardly differ
         d = 0.5 * (distance + (r - other) * (r + other) / distance)
@@ -105,7 +103,8 @@ def _arcs(r: float, lines: list[Line]) -> list[tuple[float, float]]:
     """Angles [rad] (from, to) of the circle that lie in all half-planes."""
     cut: list[tuple[float, float]] = []
     for nx, ny, d in lines:
-        half, towards = math.acos(d / r), math.atan2(ny, nx)
+        # not acos(d/r), which for d near r does not fit the chord's length to more than half of the digits
+        half, towards = math.atan2(_half_chord(r, d), d), math.atan2(ny, nx)
         low = (towards - half) % (2.0 * math.pi)
         high = low + 2.0 * half
         cut.append((low, min(high, 2.0 * math.pi)))
@@ -119,10 +118,14 @@ def _arcs(r: float, lines: list[Line]) -> list[tuple[float, float]]:
     return [*kept, (at, 2.0 * math.pi)] if at < 2.0 * math.pi else kept
 
 
+def _half_chord(r: float, d: float) -> float:
+    return math.sqrt((r - d) * (r + d))
+
+
 def _chord(r: float, line: Line, lines: list[Line]) -> tuple[float, float]:
     """The part of a line, as (from, to) along t = (-ny, nx), within the disc and the other half-planes; empty where to <= from."""
     nx, ny, d = line
-    high = math.sqrt((r - d) * (r + d))
+    high = _half_chord(r, d)
     low = -high
     for other in lines:
         if other == line:
