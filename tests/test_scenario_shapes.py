@@ -180,7 +180,7 @@ def test_reach_of_templates_is_that_of_their_discs(turns: tuple[float, float], s
     raw = {"shape": shape, "radius": "1 m", "density": "1 kg/m^3", "template": template, "equal_area": equal}
     grains = Grains.model_validate({**raw, "orientation": {"uniform": [f"{t!r} deg" for t in turns]}})
     assert grains.template is not None
-    x, y, r = (grains.scale * values for values in grains.template.centred(rigid=shape == "clump"))
+    x, y, r = (grains.scale * values for values in grains.template.centred())
     angle = np.radians(np.linspace(*turns, 4001))[:, None]
     across = np.abs(x * np.cos(angle) - y * np.sin(angle)) + r
     high = np.abs(x * np.sin(angle) + y * np.cos(angle)) + r
@@ -256,6 +256,7 @@ FROM_FILE: dict[str, Any] = {
     ("text", "changes", "words"),
     [
         ("x,y,r,aspect\n1,2,1,6\n", {"grains.shape": "ellipse"}, ["[packing] file", "line 2", "not from 1 to 5"]),
+        ("x,y,r,aspect\n1,2,1,0.5\n", {"grains.shape": "ellipse"}, ["line 2", "not from 1 to 5"]),
         ("x,y,r,aspect\n1,2,1,2\n", {}, ["[packing] file", "has a column aspect", 'shape = "ellipse"']),
         ("x,y,r\n1,2,1\n", {"grains.shape": "ellipse"}, ["[grains] aspect_ratio: is missing", "column aspect to"]),
         (

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from dem_cli.errors import ScenarioError
 from dem_cli.geometry.union import pieces
 from dem_cli.scenario import Scenario
 from dem_cli.state import Bonds, Floats, Grains
@@ -61,65 +60,21 @@ class Body:
 
 
 def body_of(scenario: Scenario) -> Body:
-    """The discs of a scenario's template. A clump's add up to the mass, centre and inertia of the union of its discs; bonded discs
-    carry the mass of their own pieces of it, and turn as discs of that mass. ScenarioError where discs cannot carry a clump's inertia.
+    """The discs of a scenario's template, each with the mass of its own piece of the outline at its centre.
+
+    These masses have the centre of the union (see `Pieces`). Bonded discs turn as discs of their mass. Those of a clump share
+    what its moment of inertia leaves after their distances from its centre, as m r^2; that is positive: it is the sum of the pieces' moments
+    about the discs' centres, and of the distance between centres times the integral of -power over the chord, for each pair that overlaps.
     """
     template = scenario.grains.template
     assert template is not None
-    rigid = scenario.grains.shape == "clump"
-    x, y, r = (scenario.grains.scale * values for values in template.centred(rigid=rigid))
+    x, y, r = (scenario.grains.scale * values for values in template.centred())
     own = pieces(x, y, r)
     share = own.area / (np.pi * r**2)
-    if not rigid:
+    if scenario.grains.shape != "clump":
         return Body(x, y, r, share, share)
-    area, _, _, polar = own.whole
-    mass = balanced(own.area, x, y)
-    carried = float(np.sum(mass * (x**2 + y**2)))
-    spin = 0.5 * mass * r**2
-    if carried >= polar:
-        raise ScenarioError(
-            f"{scenario.path or 'scenario'}: [grains] template: has discs whose centres lie too far out to carry the clump's moment of inertia "
-            f"({carried / area:.4g} for {polar / area:.4g} radii squared). Add a disc near its centre"
-        )
-    factor = (polar - carried) / float(spin.sum())
-    return Body(x, y, r, mass / (np.pi * r**2), factor * mass / (np.pi * r**2))
-
-
-def balanced(weight: Floats, x: Floats, y: Floats) -> Floats:
-    """Weights of the same sum as `weight` > 0 whose centre is (0, 0): those of least relative entropy, w exp(p x + q y), shape (k,).
-
-    They are positive, and are there wherever the centre lies among the points, which the centre of a union of discs always does:
-    mirrored at a line that has all disc centres on one side, what lies beyond the line falls into the discs again. Newton's method on the convex
-    potential log sum w exp(p x + q y).
-    """
-    points = np.array([x, y])
-    size = float(np.abs(points).max())
-    if size == 0.0:
-        return weight
-    points = points / size
-    total, slope = float(weight.sum()), np.zeros(2)
-
-    def tilted(slope: Floats) -> tuple[Floats, float]:
-        power = slope @ points
-        raised = weight * np.exp(power - power.max())
-        return raised / raised.sum(), float(np.log(raised.sum()) + power.max())
-
-    share, potential = weight / total, float(np.log(total))
-    for _ in range(100):
-        mean = points @ share
-        if np.abs(mean).max() < 1e-15:
-            break
-        spread = (points - mean[:, None]) * share @ (points - mean[:, None]).T
-        step = -np.linalg.lstsq(spread, mean, rcond=1e-12)[0]
-        while True:
-            new_share, new_potential = tilted(slope + step)
-            if new_potential <= potential or np.abs(step).max() < 1e-15:
-                break
-            step = 0.5 * step
-        if np.array_equal(slope + step, slope):
-            break
-        slope, share, potential = slope + step, new_share, new_potential
-    return total * share
+    turning = own.whole[3] - float(own.area @ (x**2 + y**2))
+    return Body(x, y, r, share, turning / (0.5 * float(own.area @ r**2)) * share)
 
 
 def build_grains(
@@ -133,7 +88,7 @@ def build_grains(
 ) -> tuple[Grains, Bonds]:
     """Elements and bonds of grains whose centres of mass are at x, y [m], shape (g,), turned by `sizes.angle`.
 
-    vx, vy [m/s], spin [rad/s]: motion of the grains, (g,) each, none where left out. ScenarioError: see `body_of`.
+    vx, vy [m/s], spin [rad/s]: motion of the grains, (g,) each, none where left out.
     """
     density, depth = scenario.grains.density, scenario.depth
     still = np.zeros(len(sizes))

@@ -20,6 +20,9 @@ Floats = npt.NDArray[np.float64]
 class Pieces:
     """What each disc has of the union, shape (n,) each: area [m^2], its centre x, y [m] (that of the disc where the area is 0), and its
     polar moment of area about that centre [m^4].
+
+    The areas, put at the centres of the discs, have the centre of the union: the first moment of a piece about its disc's centre is
+    half the integral of n times the power around its edge; the power is 0 on arcs, and the same on both sides of a chord.
     """
 
     area: Floats

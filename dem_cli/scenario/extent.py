@@ -26,7 +26,7 @@ def largest_reach(grains: Grains) -> tuple[float, float]:
         )
     if not grains.template:
         return size, size
-    x, y, r = grains.template.centred(rigid=grains.shape == "clump")
+    x, y, r = grains.template.centred()
     size *= grains.scale
     right, up, left, down = (
         size * _template(x, y, r, low - turn, high - turn) for turn in 0.5 * math.pi * np.arange(4.0)

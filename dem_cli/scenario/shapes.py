@@ -229,15 +229,10 @@ class Template(Table):
         """Area of the outline, overlaps counted once, in units of the grain's radius squared."""
         return pieces(*self.outline()).whole[0]
 
-    def centred(self, *, rigid: bool) -> tuple[Floats, Floats, Floats]:
-        """The outline with the grain's centre of mass at (0, 0): of the union for a rigid grain, else of discs that each carry at
-        their centre the mass of their own piece of it.
-        """
+    def centred(self) -> tuple[Floats, Floats, Floats]:
+        """The outline with its centre of mass at (0, 0), overlaps counted once."""
         x, y, r = self.outline()
-        own = pieces(x, y, r)
-        _, cx, cy, _ = own.whole
-        if not rigid:
-            cx, cy = float(own.area @ x / own.area.sum()), float(own.area @ y / own.area.sum())
+        _, cx, cy, _ = pieces(x, y, r).whole
         return x - cx, y - cy, r
 
     def touching(self) -> list[tuple[int, int]]:

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scenario_text import ABSENT, small
 
-import dem_cli.assembly.shapes as shapes
 from dem_cli.assembly import Assembly, build_assembly
 from dem_cli.assembly.packing import staggered_grid
-from dem_cli.errors import ScenarioError
 from dem_cli.geometry.union import pieces
 from dem_cli.scenario import parse_scenario
 from dem_cli.state import Grains
@@ -196,29 +194,6 @@ def test_bonded_discs_carry_their_own_pieces(rows: list[tuple[float, float, floa
     assert np.allclose(grains.inertia, 0.5 * grains.mass * grains.radius**2, rtol=1e-14)
     _, x, y, _ = sums(grains)
     assert np.allclose([x, y], staggered_grid(2, 3, 0.4, 0.4, 0.2), atol=1e-13)
-
-
-@given(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.01, 1.0)), min_size=3, max_size=8), st.data())
-def test_balanced_weights(rows: list[tuple[float, float, float]], data: st.DataObject) -> None:
-    """Definition: positive, of the same sum, centre at 0, and w exp(linear), which makes them those of least relative entropy."""
-    x, y, weight = np.array(rows).T
-    part = np.array([data.draw(st.floats(0.05, 1.0)) for _ in rows])
-    assume(np.linalg.svd([x - x.mean(), y - y.mean()])[1].min() > 1e-2)
-    x, y = x - part @ x / part.sum(), y - part @ y / part.sum()  # so that the centre is well within the points
-    found = shapes.balanced(weight, x, y)
-    assert found.min() > 0.0
-    assert found.sum() == pytest.approx(weight.sum(), rel=1e-12)
-    assert (found @ x, found @ y) == pytest.approx((0.0, 0.0), abs=1e-9 * weight.sum())
-    change = np.log(found / weight)
-    plane = np.column_stack([x, y, np.ones(len(x))])
-    assert np.allclose(plane @ np.linalg.lstsq(plane, change, rcond=None)[0], change, atol=1e-6)
-
-
-def test_discs_that_cannot_carry_the_inertia_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No union of discs is known to need it; weights that sit too far out stand in for one."""
-    monkeypatch.setattr(shapes, "balanced", lambda weight, _x, _y: weight * 2.0)
-    with pytest.raises(ScenarioError, match=r"\[grains\] template: has discs whose centres lie too far out"):
-        assembly("clump")
 
 
 def test_bonds_of_every_grain() -> None:
