@@ -217,12 +217,6 @@ class Contact(Table):
         example="exact",
     )
 
-    ellipse_test: Literal["exact", "enlarged"] = key(
-        "exact",
-        "how contacts of ellipses are found: exact, or by the enlarged ellipse of thesis (4.32), which sees them too late",
-        example="exact",
-    )
-
     alternatives: ClassVar = ((("damping_ratio",), ("restitution",)),)
 
     @classmethod
