@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from dem_cli.state import Contacts, Energy, Floats, Frame, Grains
+from dem_cli.state import BondStrain, Contacts, Energy, Floats, Frame, Grains
 
 RHO, THICKNESS, KN = 2480.0, 0.5, 1.0e7
 
@@ -45,7 +45,7 @@ def overlaps(x, y, radius, width=None, kn=KN, shear=0.0):
     )
 
 
-def frame_of(grains: Grains, contacts: Contacts | None) -> Frame:
+def frame_of(grains: Grains, contacts: Contacts | None, bonds: BondStrain | None = None) -> Frame:
     return Frame(
         step=7,
         time=0.25,
@@ -53,12 +53,13 @@ def frame_of(grains: Grains, contacts: Contacts | None) -> Frame:
         stage=1,
         grains=grains,
         ground=np.arange(6.0).reshape(3, 2),
-        energy=Energy(*(0.5 + k for k in range(11))),
+        energy=Energy(*(0.5 + k for k in range(12))),
         residual=-3.0,
         energy_in=40.0,
         due=frozenset({"series"}),
         contacts=contacts,
         forces=np.zeros((len(grains), 2)),
+        bonds=bonds,
         unbalanced=0.125,
     )
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from analysis_samples import bed, hexagonal, overlaps
+from analysis_samples import bed, discs, hexagonal, overlaps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
@@ -20,7 +20,7 @@ def surface_of(x, y, r, width, bins=10, present=None):
     x, y = np.asarray(x, float), np.asarray(y, float)
     radius = np.broadcast_to(r, x.shape).astype(float)
     present = np.ones(len(x), bool) if present is None else present
-    return surface.find_surface(x, y, radius, present, overlaps(x, y, radius), width, bins)
+    return surface.find_surface(discs(x, y, radius), present, overlaps(x, y, radius), width, bins)
 
 
 def test_level_of_a_flat_hexagonal_bed():
@@ -91,7 +91,7 @@ def test_near_grain_joins_the_largest_cluster_from_every_side(turn):
     x = np.array([middle, middle + 0.01, middle - 0.01, middle + 2.05 * math.cos(turn), 50.0])
     y = np.array([middle, middle, middle, middle + 2.05 * math.sin(turn), 50.0])
     c = overlaps(x[:3], y[:3], np.ones(3))
-    joined = joined_to_bed(x, y, np.ones(5), np.ones(5, bool), c.i, c.j, gap)
+    joined = joined_to_bed(discs(x, y, 1.0), np.ones(5, bool), c.i, c.j, gap)
     assert joined.tolist() == [True] * 4 + [False]
 
 
@@ -99,7 +99,7 @@ def test_grains_at_the_same_wall_are_not_joined_by_it():
     x, y, radius = np.array([0.9, 0.9, 0.9]), np.array([1.0, 6.0, 11.0]), np.ones(3)
     c = overlaps(x, y, radius, width=10.0)
     assert c.j.tolist() == [-1, -1, -1]
-    found = surface.find_surface(x, y, radius, np.ones(3, bool), c, 10.0, 4)
+    found = surface.find_surface(discs(x, y, radius), np.ones(3, bool), c, 10.0, 4)
     assert found.airborne.tolist() == [False, True, True]
 
 
@@ -152,13 +152,13 @@ def test_bed_is_the_graph_of_all_near_pairs(seed, n, spread, gap):
     of_bed = np.isin(label, label[floor])
     of_bed |= 2 * np.bincount(label[present], minlength=n)[label] > present.sum()
     c = overlaps(x, y, radius)
-    np.testing.assert_array_equal(joined_to_bed(x, y, radius, present, c.i, c.j, gap), of_bed & present)
+    np.testing.assert_array_equal(joined_to_bed(discs(x, y, radius), present, c.i, c.j, gap), of_bed & present)
 
 
 def test_grains_far_apart_need_no_huge_grid():
     x, y = np.array([0.0, 1e9, 1e9 + 1.5]), np.array([0.5, 1e12, 1e12])
     none = np.zeros(0, np.int64)
-    joined = joined_to_bed(x, y, np.ones(3), np.ones(3, bool), none, none, 0.1)
+    joined = joined_to_bed(discs(x, y, 1.0), np.ones(3, bool), none, none, 0.1)
     assert joined.tolist() == [True, True, True]
 
 
