@@ -17,6 +17,7 @@ from dem_cli.analysis.clipping import (
     disc_in_polygon,
     disc_in_rectangle,
     ellipse_in_rectangle,
+    lens_area,
     lens_at_contact,
     lens_in_polygon,
     lens_in_rectangle,
@@ -188,5 +189,7 @@ def shared_at_contacts(  # type: ignore[no-untyped-def]
             rk = curvature_radius(area_k, m[k], p[k], q[k], nx[c], ny[c])
             rl = curvature_radius(area_l, m[l], p[l], q[l], nx[c], ny[c])
             lens = lens_at_contact(nx[c], ny[c], px[c], py[c], overlap[c], rk, rl, x0, y0, x1, y1)
-            shared += min(lens, area_k, area_l)
+            # deep in each other, circles of curvature may share more than an ellipse has
+            most, all_of_it = min(area_k, area_l), lens_area(abs(rk + rl - overlap[c]), rk, rl)
+            shared += lens if all_of_it <= most else lens * most / all_of_it
     return shared
