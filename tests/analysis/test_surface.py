@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from analysis_samples import bed, discs, hexagonal, overlaps
-from hypothesis import given, settings
+from analysis_samples import bed, discs, ellipses, hexagonal, overlaps, touching
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -45,6 +45,85 @@ def test_outline_is_the_highest_disc_at_every_place(seed):
         inside = np.abs(xs - x[k]) < r[k]
         top[inside] = np.maximum(top[inside], y[k] + np.sqrt(r[k] ** 2 - (xs[inside] - x[k]) ** 2))
     np.testing.assert_allclose(found.eta, top.reshape(8, -1).mean(axis=1), atol=0.01 * r.mean())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_outline_is_the_highest_ellipse_at_every_place(seed):
+    rng = np.random.default_rng(seed)
+    n, width = 150, 1.0
+    r, k = rng.uniform(0.01, 0.08, n), rng.choice([1.0, 1.3, 3.0, 5.0], n)
+    grains = ellipses(
+        rng.uniform(0, width, n), rng.uniform(0, 0.4, n), r * np.sqrt(k), r / np.sqrt(k), rng.uniform(0, math.pi, n)
+    )
+    found = surface.find_surface(grains, np.ones(n, bool), touching(grains), width, 8)
+    assert found.fill.sum() > 100
+    # every ellipse as a dense polygon, its height at the same samples by interpolation along its upper half
+    samples = 8 * math.ceil(width / 8 / (surface.SAMPLE * grains.radius.mean()))
+    xs = (np.arange(samples) + 0.5) / samples
+    top = np.zeros(len(xs))
+    t = np.linspace(0.0, math.tau, 20_001)
+    for g in np.flatnonzero(found.fill):
+        u, v = grains.a[g] * np.cos(t), grains.b[g] * np.sin(t)
+        c, s = math.cos(grains.angle[g]), math.sin(grains.angle[g])
+        x, y = grains.x[g] + u * c - v * s, grains.y[g] + u * s + v * c
+        left, right = int(np.argmin(x[:-1])), int(np.argmax(x[:-1]))
+        upper = np.arange(right, left + (len(t) - 1) * (left < right) + 1) % (len(t) - 1)
+        inside = (xs > x[left]) & (xs < x[right])
+        top[inside] = np.maximum(top[inside], np.interp(xs[inside], x[upper][::-1], y[upper][::-1]))
+    np.testing.assert_allclose(found.eta, top.reshape(8, -1).mean(axis=1), rtol=1e-6)
+
+
+def test_ellipses_of_equal_axes_have_the_surface_of_discs():
+    grains, width = bed(seed=6)
+    contacts = overlaps(grains.x, grains.y, grains.radius, width)
+    present = np.ones(len(grains), bool)
+    r, angle = grains.radius, np.linspace(0.0, 6.0, len(grains))
+    disc = surface.find_surface(grains, present, contacts, width, 10)
+    for more in (0.0, 1e-14):
+        ellipse = ellipses(grains.x, grains.y, r * (1.0 + more), r, angle)
+        found = surface.find_surface(ellipse, present, contacts, width, 10)
+        np.testing.assert_allclose(found.eta, disc.eta, rtol=1e-9 if more else 1e-15)
+        assert np.array_equal(found.fill, disc.fill)
+
+
+@pytest.mark.parametrize(("gap", "joined"), [(0.99, True), (1.01, False)])
+@pytest.mark.parametrize(("angle", "low"), [(0.0, 0.5), (0.5 * math.pi, 2.0), (0.7, None)])
+def test_ellipse_joins_the_floor_with_its_lowest_point(angle, low, gap, joined):
+    low = low or math.hypot(2.0 * math.sin(angle), 0.5 * math.cos(angle))
+    grains = ellipses([2.0, 7.0, 12.0], [0.5, low + gap * surface.NEAR, 30.0], 2.0, 0.5, [0.0, angle, 0.0])
+    found = surface.find_surface(grains, np.ones(3, bool), touching(grains), 14.0, 7)
+    assert found.fill.tolist() == [True, joined, False]
+
+
+def gap_of_ellipses(grains, i, j, directions=5000):
+    """Largest n.delta - h_i - h_j over many directions: below the true gap by 1e-6 of the distance at most."""
+    t = np.arange(directions) * (math.tau / directions)
+    gap = (grains.x[j] - grains.x[i]) * np.cos(t) + (grains.y[j] - grains.y[i]) * np.sin(t)
+    for k in (i, j):
+        gap -= np.hypot(grains.a[k] * np.cos(t - grains.angle[k]), grains.b[k] * np.sin(t - grains.angle[k]))
+    return float(gap.max())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 25), st.floats(0.5, 8.0), st.floats(0.0, 0.3))
+def test_bed_of_ellipses_is_the_graph_of_all_near_pairs(seed, n, spread, gap):
+    rng = np.random.default_rng(seed)
+    r, k = rng.uniform(0.05, 0.6, n), rng.choice([1.0, 1.5, 5.0], n)
+    place = rng.uniform(0, spread, n), rng.uniform(0, 2 * spread, n)
+    grains = ellipses(*place, r * np.sqrt(k), r / np.sqrt(k), rng.uniform(0, math.pi, n))
+    present = rng.random(n) < 0.85
+    near = np.zeros((n, n), bool)
+    for i in range(n):
+        for j in range(i):
+            apart = gap_of_ellipses(grains, i, j)
+            assume(abs(apart - gap) > 1e-5)
+            near[i, j] = present[i] and present[j] and apart < gap
+    label = connected_components(coo_matrix(near), directed=False)[1]
+    low = np.hypot(grains.a * np.sin(grains.angle), grains.b * np.cos(grains.angle))
+    of_bed = np.isin(label, label[present & (grains.y - low < gap)])
+    of_bed |= 2 * np.bincount(label[present], minlength=n)[label] > present.sum()
+    c = touching(grains)
+    np.testing.assert_array_equal(joined_to_bed(grains, present, c.i, c.j, gap), of_bed & present)
 
 
 def test_lone_disc_and_empty_bins():
