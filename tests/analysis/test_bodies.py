@@ -177,13 +177,12 @@ def test_pair_in_the_air_is_one_airborne_grain():
 
 
 def test_pair_near_the_bed_joins_as_a_whole_and_joins_others():
-    # three columns: the pair bridges from the first, through a gap, and carries the last; apart from it nothing is joined
-    column = [[(1.0, 1.0, 1.0)], [(1.0, 3.05, 1.0), (3.0, 3.05, 1.0)], [(5.05, 3.05, 1.0)], [(9.0, 9.0, 1.0)]]
+    # the pair's discs are half a radius apart: one is near a grain on the floor, the other carries the next; apart none is joined
+    column = [[(1.0, 1.0, 1.0)], [(1.0, 3.05, 1.0), (3.5, 3.05, 1.0)], [(5.55, 3.05, 1.0)], [(9.0, 9.0, 1.0)]]
     grains = bodies_of(*column)
     present = np.ones(5, bool)
     assert surface.find_surface(grains, present, touching(grains), 10.0, 5).airborne.tolist() == [False] * 4 + [True]
     apart = replace(grains, body=grains.id)
-    apart = replace(apart, x=apart.x + np.array([0, 0, 0.5, 0.5, 0]))
     assert surface.find_surface(apart, present, touching(apart), 10.0, 5).airborne.tolist() == [False] * 2 + [True] * 3
 
 
@@ -222,6 +221,6 @@ def test_pair_with_an_escaped_or_lost_element_is_in_no_measure():
 
 
 def test_overlap_of_an_ellipse_is_over_its_smaller_axis():
-    grains = ellipses([1.0, 1.0], [1.0, 2.9], [2.0, 1.0], [1.0, 1.0], [0.0, 0.0])
+    grains = ellipses([2.0, 2.0], [1.0, 2.9], [2.0, 1.5], [1.0, 1.0], [0.0, 0.0])
     row = measured(grains, touching(grains), 4.0).row
     assert row["max_overlap"] == pytest.approx(0.1, rel=1e-12)

@@ -13,7 +13,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from dem_cli.analysis import surface
+from dem_cli.analysis.bodies import outlines
 from dem_cli.analysis.clusters import joined_to_bed
+from dem_cli.geometry.ellipse import outline
 
 
 def surface_of(x, y, r, width, bins=10, present=None):
@@ -71,6 +73,26 @@ def test_outline_is_the_highest_ellipse_at_every_place(seed):
         inside = (xs > x[left]) & (xs < x[right])
         top[inside] = np.maximum(top[inside], np.interp(xs[inside], x[upper][::-1], y[upper][::-1]))
     np.testing.assert_allclose(found.eta, top.reshape(8, -1).mean(axis=1), rtol=1e-6)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(0.3, 1.5), st.booleans(), st.floats(3.0, 4.0), st.floats(0.001, 0.2), st.floats(0.0, 1.0))
+def test_nothing_above_a_steep_ellipse_is_taken_for_hidden(angle, falling, x, inwards, above):
+    """A small disc above the end of a steep ellipse, where the outline rises most within a column of samples."""
+    angle = -angle if falling else angle
+    m, p, q = outline(3.0, 0.6, angle)
+    end = math.copysign(math.sqrt(m + p), -q)
+    at = end - math.copysign(inwards, end)
+    disc_y = 5.0 + q / (m + p) * at + above
+    grains = ellipses([x, x + at], [5.0, disc_y], [3.0, 0.05], [0.6, 0.05], [angle, 0.0])
+    spacing = 1 / 32
+    top = np.zeros(256)
+    surface._raise_outline(grains.x, grains.y, grains.radius, *outlines(grains), np.ones(2, bool), spacing, top)
+    d = (np.arange(256)[:, None] + 0.5) * spacing - grains.x
+    m, p, q = outlines(grains)
+    reach = m + p - d * d
+    height = grains.y + (q * d + grains.a * grains.b * np.sqrt(np.maximum(reach, 0.0))) / (m + p)
+    np.testing.assert_allclose(top, np.where(reach > 0.0, height, 0.0).max(axis=1), rtol=1e-12)
 
 
 def test_ellipses_of_equal_axes_have_the_surface_of_discs():
