@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from dem_cli.analysis.bodies import outlines
+from dem_cli.geometry.ellipse import gap_slopes, widest_gap
 from dem_cli.jit import kernel
-from dem_cli.state import Bools, Floats, Ints
+from dem_cli.state import Bools, Floats, Grains, Ints
 
 
 @kernel()
@@ -30,13 +34,17 @@ def _unite(parent, size, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _unite_contacts(i, j, parent, size):  # type: ignore[no-untyped-def]
-    """Join the grains of each contact (c,), walls left out; parent and size (n,) are modified in place.
+def _unite_contacts(body, i, j, parent, size):  # type: ignore[no-untyped-def]
+    """Join the elements of each grain and of each contact (c,), walls left out; parent and size (n,) are modified in place.
 
     Returns the root of a largest cluster.
     """
+    for k in range(1, len(body)):
+        if body[k] == body[k - 1]:
+            _unite(parent, size, k, k - 1)
     for c in range(len(i)):
-        if j[c] >= 0:
+        # most pairs are known to be of one cluster already: their parents say so
+        if j[c] >= 0 and parent[i[c]] != parent[j[c]]:
             _unite(parent, size, i[c], j[c])
     largest = 0
     for k in range(len(parent)):
@@ -58,23 +66,43 @@ def _sort_into_cells(cell, start, order):  # type: ignore[no-untyped-def]
 
 
 @kernel()
-def _unite_near(x, y, radius, gap, cell, columns, start, order, largest, parent, size):  # type: ignore[no-untyped-def]
-    """Join grains less than gap [m] apart; parent and size are modified in place.
+def _ellipses_near(dx, dy, mk, pk, qk, ml, pl, ql, gap):  # type: ignore[no-untyped-def]
+    """Whether two ellipses are less than gap [m] apart, centres (dx, dy) [m] apart.
 
-    Neighbours lie in the 3 x 3 cells about a grain; the outermost cells of the grid are empty. Grains of
+    The gap along any direction is a lower bound: that along the line of centres settles most pairs.
+    """
+    d = math.sqrt(dx * dx + dy * dy)
+    along, _, _ = gap_slopes(dx, dy, mk, pk, qk, ml, pl, ql, dx / d, dy / d)
+    if along >= gap:
+        return False
+    _, _, widest = widest_gap(dx, dy, mk, pk, qk, ml, pl, ql, 0.0, 0.0)
+    return widest < gap
+
+
+@kernel()
+def _unite_near(x, y, a, b, m, p, q, gap, cell, columns, start, order, largest, parent, size):  # type: ignore[no-untyped-def]
+    """Join elements less than gap [m] apart; parent and size are modified in place.
+
+    Neighbours lie in the 3 x 3 cells about an element; the outermost cells of the grid are empty. Elements of
     the cluster of `largest` need not look around: what is near them finds them, and among themselves
-    nothing changes.
+    nothing changes. Circles about and within ellipses tell most pairs, and all of discs.
     """
     for k in range(len(x)):
         if _root(parent, k) == _root(parent, largest):
             continue
         for below in range(cell[k] - columns, cell[k] + columns + 1, columns):
             for s in range(start[below - 1], start[below + 2]):
-                m = order[s]
-                dx, dy = x[m] - x[k], y[m] - y[k]
-                reach = radius[k] + radius[m] + gap
-                if m != k and dx * dx + dy * dy < reach * reach:
-                    _unite(parent, size, k, m)
+                l = order[s]  # noqa: E741
+                dx, dy = x[l] - x[k], y[l] - y[k]
+                dd = dx * dx + dy * dy
+                outer, inner = a[k] + a[l] + gap, b[k] + b[l] + gap
+                if l == k or dd >= outer * outer:
+                    continue
+                near = dd < inner * inner
+                if not near and _root(parent, k) != _root(parent, l):
+                    near = _ellipses_near(dx, dy, m[k], p[k], q[k], m[l], p[l], q[l], gap)
+                if near:
+                    _unite(parent, size, k, l)
 
 
 @kernel()
@@ -85,7 +113,7 @@ def _roots(parent):  # type: ignore[no-untyped-def]
 
 
 def _cells(x: Floats, y: Floats, side: float) -> tuple[Ints, int, int]:
-    """Cell of each grain (n,), number of columns and of cells, in a grid of square cells with an empty rim.
+    """Cell of each element (n,), number of columns and of cells, in a grid of square cells with an empty rim.
 
     Cells are at least `side` [m] wide, and wider if there would be more than about four a grain.
     """
@@ -101,41 +129,45 @@ def _cells(x: Floats, y: Floats, side: float) -> tuple[Ints, int, int]:
     return row * columns + column, columns, columns * rows
 
 
-def clusters(x: Floats, y: Floats, radius: Floats, i: Ints, j: Ints, gap: float) -> Ints:
-    """A number for each grain, shape (n,), the same for all grains of a cluster.
+def joined_to_bed(grains: Grains, present: Bools, i: Ints, j: Ints, gap: float) -> Bools:
+    """Which elements belong to the bed, shape (n,); those with present = False, the same for all elements of a grain, never do.
 
-    Two grains are joined if they touch (contacts i, j, walls as in state.Contacts) or are less than `gap`
-    [m] apart.
-    """
-    parent = np.arange(len(x))
-    size = np.ones(len(x), dtype=np.int64)
-    largest = _unite_contacts(i, j, parent, size)
-    cell, columns, cells = _cells(x, y, 2.0 * float(radius.max()) + gap)
-    start = np.zeros(cells + 1, dtype=np.int64)
-    order = np.empty(len(x), dtype=np.int64)
-    _sort_into_cells(cell, start, order)
-    _unite_near(x, y, radius, gap, cell, columns, start, order, largest, parent, size)
-    _roots(parent)
-    return parent
-
-
-def joined_to_bed(x: Floats, y: Floats, radius: Floats, present: Bools, i: Ints, j: Ints, gap: float) -> Bools:
-    """Which grains belong to the bed, shape (n,); grains with present = False never do.
-
-    The bed is every cluster (touching, or gaps below `gap` [m]) with a grain less than `gap` above the
-    floor y = 0, and a cluster with more than half of the present grains even if it has left the floor.
+    The bed is every cluster with an element less than `gap` [m] above the floor y = 0, and a cluster with more than half of
+    the present grains even if it has left the floor. A cluster is made of elements of one grain, that touch (contacts
+    i, j, walls as in state.Contacts), or that are less than `gap` apart: ellipses by their true gap.
     """
     index = np.flatnonzero(present)
-    if len(index) < len(x):
-        number = np.cumsum(present) - 1
-        kept = present[i] & ((j < 0) | present[j])
-        i, j = number[i[kept]], np.where(j[kept] < 0, -1, number[j[kept]])
-        x, y, radius = x[index], y[index], radius[index]
     joined = np.zeros(len(present), dtype=bool)
     if len(index) == 0:
         return joined
-    cluster = clusters(x, y, radius, i, j, gap)
-    of_bed = 2 * np.bincount(cluster, minlength=len(x)) > len(x)
-    of_bed[cluster[y - radius < gap]] = True
+    elements: tuple[Floats, ...] = (grains.x, grains.y, grains.a, grains.b, *outlines(grains))
+    body = grains.body
+    if len(index) < len(present):
+        number = np.cumsum(present) - 1
+        kept = present[i] & ((j < 0) | present[j])
+        i, j = number[i[kept]], np.where(j[kept] < 0, -1, number[j[kept]])
+        elements = tuple(array[index] for array in elements)
+        body = body[index]
+    cluster = _clusters(elements, body, i, j, gap)
+    # one element a grain, to count grains by
+    head = np.append(True, body[1:] != body[:-1])
+    of_bed = 2 * np.bincount(cluster[head], minlength=len(index)) > np.count_nonzero(head)
+    _, y, _, _, m, p, _ = elements
+    of_bed[cluster[y - np.sqrt(m - p) < gap]] = True
     joined[index] = of_bed[cluster]
     return joined
+
+
+def _clusters(elements: tuple[Floats, ...], body: Ints, i: Ints, j: Ints, gap: float) -> Ints:
+    """A number for each element, shape (n,), the same for all of a cluster (see `joined_to_bed`); elements: x, y, a, b, m, p, q."""
+    x, y, a = elements[:3]
+    parent = np.arange(len(x))
+    size = np.ones(len(x), dtype=np.int64)
+    largest = _unite_contacts(body, i, j, parent, size)
+    cell, columns, cells = _cells(x, y, 2.0 * float(a.max()) + gap)
+    start = np.zeros(cells + 1, dtype=np.int64)
+    order = np.empty(len(x), dtype=np.int64)
+    _sort_into_cells(cell, start, order)
+    _unite_near(*elements, gap, cell, columns, start, order, largest, parent, size)
+    _roots(parent)
+    return parent

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dem_cli.analysis import stress, surface
+from dem_cli.analysis import bodies, stress, surface
 from dem_cli.analysis.void_ratio import (
     WindowMargins,
     container,
@@ -16,15 +16,15 @@ from dem_cli.analysis.void_ratio import (
     solid_area,
     void_ratio,
 )
-from dem_cli.state import Bools, Floats, Frame, Ints
+from dem_cli.state import BondStrain, Bools, Floats, Frame, Ints
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of a frame with n grains.
+    """Measures of a frame with n elements.
 
     row: the measured part of the series, named as in results.schema. eta [m]: free surface, shape (bins,).
-    coordination: contacts of each grain, shape (n,). stress [Pa]: xx, xy, yx, yy in each grain, shape (n, 4).
+    coordination: contacts of the grain of each element, shape (n,). stress [Pa]: xx, xy, yx, yy in that grain, shape (n, 4).
     """
 
     row: dict[str, float]
@@ -53,21 +53,25 @@ def measure_frame(
     if contacts is None:
         raise ValueError("a frame without contacts cannot be measured")
     grains = frame.grains
-    x, y, radius = grains.x, grains.y, grains.radius
-    present = ~grains.escaped & np.isfinite(x) & np.isfinite(y)
-    found = surface.find_surface(x, y, radius, present, contacts, width, surface_bins)
+    x, y = grains.x, grains.y
+    inside = bodies.whole(grains, ~grains.escaped)
+    present = inside & bodies.whole(grains, np.isfinite(x) & np.isfinite(y))
+    found = surface.find_surface(grains, present, contacts, width, surface_bins)
     level = surface.mean_depth(found.eta)
-    number = np.count_nonzero(found.fill)
-    has_bed = number > 0 and 2 * number >= np.count_nonzero(present)
+    # one element a grain, to count grains by
+    head = slice(None) if bodies.single(grains) else bodies.first_elements(grains)
+    fill = found.fill[head]
+    number = np.count_nonzero(fill)
+    has_bed = number > 0 and 2 * number >= np.count_nonzero(present[head])
 
     inner = inner_window(width, lowest_surface(found.eta, window), window)
     whole_solid = inner_solid = math.nan
     sigma = np.full((2, 2), math.nan)
     if has_bed:
-        whole_solid = solid_area(x, y, radius, found.fill, contacts, container(width))
-        inner_solid = solid_area(x, y, radius, found.fill, contacts, inner)
-        sigma = stress.window_stress(x, y, contacts, inner, depth)
-    coordination = stress.coordination(len(grains), contacts)
+        whole_solid = solid_area(grains, found.fill, contacts, container(width))
+        inner_solid = solid_area(grains, found.fill, contacts, inner)
+        sigma = stress.window_stress(*bodies.centres(grains), contacts, inner, depth)
+    coordination = stress.coordination(grains, contacts)
     fabric = stress.fabric(contacts)
     center_x, center_y = _center_of_mass(grains.mass, x, y, present)
     row = {
@@ -78,11 +82,11 @@ def measure_frame(
         "depth": level,
         "roughness": surface.roughness(found.eta),
         "mode1": surface.antisymmetric_mode(found.eta),
-        "coordination": float(coordination[found.fill].mean()) if number else math.nan,
+        "coordination": float(coordination[head][fill].mean()) if number else math.nan,
         "contacts": float(len(contacts)),
         "sliding": stress.sliding_share(contacts),
-        "airborne": float(np.count_nonzero(found.airborne)),
-        "escaped": float(np.count_nonzero(grains.escaped)),
+        "airborne": float(np.count_nonzero(found.airborne[head])),
+        "escaped": float(np.count_nonzero(~inside[head])),
         "fabric_xx": float(fabric[0, 0]),
         "fabric_xy": float(fabric[0, 1]),
         "fabric_yy": float(fabric[1, 1]),
@@ -90,11 +94,11 @@ def measure_frame(
         "stress_xy": float(0.5 * (sigma[0, 1] + sigma[1, 0])),
         "stress_yy": float(sigma[1, 1]),
         "stress_asymmetry": float(0.5 * (sigma[0, 1] - sigma[1, 0])),
-        "max_overlap": stress.max_overlap_ratio(radius, contacts),
+        "max_overlap": stress.max_overlap_ratio(grains.b, contacts),
         "center_x": center_x,
         "center_y": center_y,
     }
-    return Measures(row, found.eta, coordination, stress.grain_stress(x, y, radius, contacts, depth))
+    return Measures(row, found.eta, coordination, stress.grain_stress(grains, contacts, depth))
 
 
 def series_row(frame: Frame, measures: Measures) -> dict[str, float]:
@@ -107,6 +111,7 @@ def series_row(frame: Frame, measures: Measures) -> dict[str, float]:
         "stage": float(frame.stage),
         "time_step": frame.dt,
         **measures.row,
+        **_bond_strain(frame.bonds),
         "unbalanced": frame.unbalanced,
         "kinetic": energy.kinetic,
         "potential": energy.potential,
@@ -115,6 +120,7 @@ def series_row(frame: Frame, measures: Measures) -> dict[str, float]:
         "friction": energy.friction,
         "dashpot_normal": energy.dashpot_normal,
         "dashpot_tangential": energy.dashpot_tangential,
+        "bond_energy": energy.bonds,
         "damping": energy.damping,
         "escaped_energy": energy.escaped,
         "time_step_energy": energy.time_step,
@@ -127,6 +133,17 @@ def series_row(frame: Frame, measures: Measures) -> dict[str, float]:
         "ground_vy": ground_vy,
         "ground_ax": ground_ax,
         "ground_ay": ground_ay,
+    }
+
+
+def _bond_strain(bonds: BondStrain | None) -> dict[str, float]:
+    """Largest gap [m], slip [m] and roll [rad] of the bonds in magnitude; NaN without a bond."""
+    if bonds is None or not len(bonds.gap):
+        return dict.fromkeys(("bond_gap", "bond_slip", "bond_roll"), math.nan)
+    return {
+        "bond_gap": float(np.abs(bonds.gap).max()),
+        "bond_slip": float(np.abs(bonds.slip).max()),
+        "bond_roll": float(np.abs(bonds.roll).max()),
     }
 
 

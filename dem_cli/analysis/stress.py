@@ -1,4 +1,8 @@
-"""Stress, fabric and contact numbers of a sample. Compression is positive; stress_ab = f_a l_b."""
+"""Stress, fabric and contact numbers of a sample. Compression is positive; stress_ab = f_a l_b.
+
+Grains may consist of several elements (state.Grains): the forces on any of them act on the grain, branches run between centres of
+mass of grains, and contacts are counted by grains.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +10,10 @@ import math
 
 import numpy as np
 
+from dem_cli.analysis.bodies import areas, centres, single
 from dem_cli.analysis.void_ratio import Rectangle
 from dem_cli.jit import kernel
-from dem_cli.state import Contacts, Floats, Ints
+from dem_cli.state import Contacts, Floats, Grains, Ints
 
 
 @kernel()
@@ -46,7 +51,8 @@ def _window_sum(x, y, i, j, nx, ny, px, py, normal, shear, x0, y0, x1, y1):  # t
 def window_stress(x: Floats, y: Floats, contacts: Contacts, window: Rectangle, thickness: float) -> Floats:
     """Mean stress [Pa] of a window, shape (2, 2): (1/(A L)) sum of force (x) branch (physics.md 0).
 
-    The branch runs from centre to centre, to a wall from centre to contact point. Each contact carries
+    x, y [m]: centre of mass of the grain that each element belongs to (`bodies.centres`), shape (n,). The branch runs from centre to
+    centre, to a wall from centre to contact point. Each contact carries
     its force along its branch, so it counts with the share of the branch inside the window: exact for the
     mean of that field, and windows side by side add up. NaN for an empty window. Asymmetric only as far
     as grains are not in equilibrium.
@@ -59,8 +65,11 @@ def window_stress(x: Floats, y: Floats, contacts: Contacts, window: Rectangle, t
 
 
 @kernel()
-def _grain_sums(x, y, i, j, nx, ny, px, py, normal, shear, out):  # type: ignore[no-untyped-def]
-    """Add force (x) (contact point - centre) of each contact to its grains: out (n, 4), modified in place."""
+def _grain_sums(x, y, body, i, j, nx, ny, px, py, normal, shear, out):  # type: ignore[no-untyped-def]
+    """Add force (x) (contact point - centre) of each contact to its grains: out (grains, 4), modified in place.
+
+    x, y (n,): centre of the grain of each element.
+    """
     for c in range(len(i)):
         fx = normal[c] * nx[c] - shear[c] * ny[c]
         fy = normal[c] * ny[c] + shear[c] * nx[c]
@@ -69,19 +78,24 @@ def _grain_sums(x, y, i, j, nx, ny, px, py, normal, shear, out):  # type: ignore
             k = j[c] if side else i[c]
             sign = -1.0 if side else 1.0
             lx, ly = sign * (px[c] - x[k]), sign * (py[c] - y[k])
-            out[k, 0] += fx * lx
-            out[k, 1] += fx * ly
-            out[k, 2] += fy * lx
-            out[k, 3] += fy * ly
+            grain = body[k]
+            out[grain, 0] += fx * lx
+            out[grain, 1] += fx * ly
+            out[grain, 2] += fy * lx
+            out[grain, 3] += fy * ly
 
 
-def grain_stress(x: Floats, y: Floats, radius: Floats, contacts: Contacts, thickness: float) -> Floats:
-    """Mean stress [Pa] in each grain, shape (n, 4) as xx, xy, yx, yy: sum of force (x) arm over pi r^2 L."""
-    out = np.zeros((len(x), 4))
+def grain_stress(grains: Grains, contacts: Contacts, thickness: float) -> Floats:
+    """Mean stress [Pa] in the grain of each element, shape (n, 4) as xx, xy, yx, yy: sum of force (x) arm over its area times L.
+
+    The arm runs from the grain's centre of mass to the contact point; the area is that of the grain, overlaps of its elements
+    counted once. All elements of a grain have the same stress.
+    """
+    out = np.zeros((grains.grain_count, 4))
     c = contacts
-    _grain_sums(x, y, c.i, c.j, c.nx, c.ny, c.px, c.py, c.normal, c.shear, out)
-    out /= (math.pi * thickness * radius**2)[:, None]
-    return out
+    _grain_sums(*centres(grains), grains.body, c.i, c.j, c.nx, c.ny, c.px, c.py, c.normal, c.shear, out)
+    out /= (thickness * areas(grains))[:, None]
+    return out if single(grains) else out[grains.body]
 
 
 def fabric(contacts: Contacts) -> Floats:
@@ -95,10 +109,16 @@ def fabric(contacts: Contacts) -> Floats:
     return np.array([[nx @ nx, xy], [xy, ny @ ny]]) / number
 
 
-def coordination(grains: int, contacts: Contacts) -> Ints:
-    """Contacts of each grain, shape (grains,): one with a wall counts like one with a grain."""
-    count = np.bincount(contacts.i, minlength=grains)
-    count += np.bincount(contacts.j[contacts.j >= 0], minlength=grains)
+def coordination(grains: Grains, contacts: Contacts) -> Ints:
+    """Contacts of the grain of each element, shape (n,): one with a wall counts like one with a grain.
+
+    Those on all elements of a grain are added up, so two contacts between the same two grains count as two.
+    """
+    count = np.bincount(contacts.i, minlength=len(grains))
+    count += np.bincount(contacts.j[contacts.j >= 0], minlength=len(grains))
+    if not single(grains):
+        # whole numbers far below 2^53, which floats add up exactly
+        count = np.bincount(grains.body, count)[grains.body]
     return count.astype(np.int64, copy=False)
 
 
@@ -107,12 +127,13 @@ def sliding_share(contacts: Contacts) -> float:
     return float(contacts.sliding.mean()) if len(contacts) else math.nan
 
 
-def max_overlap_ratio(radius: Floats, contacts: Contacts) -> float:
-    """Largest overlap over the smaller radius of the two bodies (of the grain, at a wall); 0 without
-    contacts.
+def max_overlap_ratio(size: Floats, contacts: Contacts) -> float:
+    """Largest overlap over the smaller `size` [m] of the two elements (of the one, at a wall); 0 without contacts.
+
+    size (n,): radius of a disc, smaller semi-axis b of an ellipse, half of its least thickness.
     """
     if not len(contacts):
         return 0.0
     other = np.where(contacts.j >= 0, contacts.j, contacts.i)
-    smaller = np.minimum(radius[contacts.i], radius[other])
+    smaller = np.minimum(size[contacts.i], size[other])
     return float(np.max(contacts.overlap / smaller))

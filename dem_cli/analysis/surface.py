@@ -1,6 +1,6 @@
 """Free surface of the fill, the grains in the air above it, and the shape of the surface in numbers.
 
-The surface is the top outline of the fill: at each x the highest point of a disc there, the floor y = 0
+The surface is the top outline of the fill: at each x the highest point of a disc or ellipse there, the floor y = 0
 where there is none. It is sampled at the middles of intervals no longer than SAMPLE mean radii and
 averaged over each bin. A single level h thus stands for the area under the outline, which is what
 "container width x mean surface height" needs: a flat bed of touching equal discs has its level at pi/4 r
@@ -14,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dem_cli.analysis.bodies import centres, outlines
 from dem_cli.analysis.clusters import joined_to_bed
 from dem_cli.jit import kernel
-from dem_cli.state import Bools, Contacts, Floats
+from dem_cli.state import Bools, Contacts, Floats, Grains
 
 NEAR = 0.1
-"""Gap, in mean radii, below which a grain counts as joined to its neighbour or to the floor."""
+"""Gap, in mean radii of the elements, below which a grain counts as joined to its neighbour or to the floor."""
 
 SAMPLE = 1 / 32
 """Longest distance of two samples of the outline in mean radii."""
@@ -30,8 +31,8 @@ COLUMN = 16
 
 @dataclass(frozen=True)
 class Surface:
-    """eta [m]: mean height of the outline in each bin, shape (bins,). fill: grains of the fill, airborne:
-    grains above it that touch nothing joined to it, shape (n,); the rest have escaped.
+    """eta [m]: mean height of the outline in each bin, shape (bins,). fill: elements of grains of the fill, airborne:
+    those of grains above it that touch nothing joined to it, shape (n,); the rest have escaped. A grain is of one kind as a whole.
     """
 
     eta: Floats
@@ -45,65 +46,78 @@ def bin_centers(width: float, bins: int) -> Floats:
 
 
 @kernel(inline=True)
-def _samples(x, radius, spacing, count):  # type: ignore[no-untyped-def]
-    """First sample within a disc and the one after the last; in range before they become integers."""
-    first = max(0.0, math.ceil((x - radius) / spacing - 0.5))
-    final = min(count - 1.0, math.floor((x + radius) / spacing - 0.5))
+def _reach(radius, square):  # type: ignore[no-untyped-def]
+    """Square root of m + p or m - p: for discs the radius, which is faster."""
+    return radius if square == radius * radius else math.sqrt(square)
+
+
+@kernel(inline=True)
+def _samples(x, reach, spacing, count):  # type: ignore[no-untyped-def]
+    """First sample within `reach` of x and the one after the last; in range before they become integers."""
+    first = max(0.0, math.ceil((x - reach) / spacing - 0.5))
+    final = min(count - 1.0, math.floor((x + reach) / spacing - 0.5))
     return int(first), int(final) + 1
 
 
 @kernel()
-def _raise_outline(x, y, radius, member, spacing, top):  # type: ignore[no-untyped-def]
-    """Raise heights `top` [m] at x = (k + 1/2) spacing to the discs with member = True; modified in place.
+def _raise_outline(x, y, radius, m, p, q, member, spacing, top):  # type: ignore[no-untyped-def]
+    """Raise heights `top` [m] at x = (k + 1/2) spacing to the elements with member = True; modified in place.
 
-    Discs below the centre of one that spans a whole column of samples are hidden there and passed over.
+    An ellipse reaches w = sqrt(m + p) to either side, and at the distance d from its centre up to q/w^2 d + a b/w^2 sqrt(w^2 - d^2):
+    for discs sqrt(r^2 - d^2). Elements below the middle of one that spans a whole column of samples are hidden there and passed over.
     """
     count = len(top)
     high = np.full(count // COLUMN + 1, -np.inf)
     for k in range(len(x)):
         if member[k]:
-            first, end = _samples(x[k], radius[k], spacing, count)
+            ww = m[k] + p[k]
+            first, end = _samples(x[k], _reach(radius[k], ww), spacing, count)
             for c in range((first + COLUMN - 1) // COLUMN, end // COLUMN):
-                high[c] = max(high[c], y[k])
+                low = y[k]
+                if q[k] != 0.0:
+                    left, right = (c * COLUMN + 0.5) * spacing, ((c + 1) * COLUMN - 0.5) * spacing
+                    low += min(q[k] / ww * (left - x[k]), q[k] / ww * (right - x[k]))
+                high[c] = max(high[c], low)
     for k in range(len(x)):
         if not member[k]:
             continue
-        cx, cy, r = x[k], y[k], radius[k]
-        first, end = _samples(cx, r, spacing, count)
+        cx, cy, ww, highest = x[k], y[k], m[k] + p[k], y[k] + _reach(radius[k], m[k] - p[k])
+        first, end = _samples(cx, _reach(radius[k], ww), spacing, count)
         for c in range(first // COLUMN, (end - 1) // COLUMN + 1):
-            if high[c] >= cy + r:
+            if high[c] >= highest:
                 continue
+            slope, height = q[k] / ww, radius[k] * radius[k] / ww
             for s in range(max(first, c * COLUMN), min(end, (c + 1) * COLUMN)):
                 d = (s + 0.5) * spacing - cx
                 # below zero by rounding at most
-                top[s] = max(top[s], cy + math.sqrt(abs(r * r - d * d)))
+                top[s] = max(top[s], cy + slope * d + height * math.sqrt(abs(ww - d * d)))
 
 
-def find_surface(
-    x: Floats, y: Floats, radius: Floats, present: Bools, contacts: Contacts, width: float, bins: int
-) -> Surface:
-    """Surface of the grains with present = True (in the container) between x = 0 and `width` [m]; arrays
-    of shape (n,).
+def find_surface(grains: Grains, present: Bools, contacts: Contacts, width: float, bins: int) -> Surface:
+    """Surface of the elements with present = True (in the container) between x = 0 and `width` [m]; shape (n,), the same for
+    all elements of a grain.
 
     A grain is of the fill if it is joined to the bed by contacts and gaps below NEAR mean radii
-    (`joined_to_bed`), or if its centre lies below the outline of the joined ones: a loose grain in a pore
+    (`joined_to_bed`), or if its centre of mass lies below the outline of the joined ones: a loose grain in a pore
     is no airborne one.
     """
     if not present.any():
-        none = np.zeros(len(x), dtype=bool)
+        none = np.zeros(len(grains), dtype=bool)
         return Surface(np.zeros(bins), none, none)
-    mean_radius = float(radius[present].mean())
-    fill = joined_to_bed(x, y, radius, present, contacts.i, contacts.j, NEAR * mean_radius)
+    mean_radius = float(grains.radius[present].mean())
+    fill = joined_to_bed(grains, present, contacts.i, contacts.j, NEAR * mean_radius)
     per_bin = math.ceil(width / bins / (SAMPLE * mean_radius))
     spacing = width / (bins * per_bin)
     top = np.zeros(bins * per_bin)
-    _raise_outline(x, y, radius, fill, spacing, top)
+    elements = (grains.x, grains.y, grains.radius, *outlines(grains))
+    _raise_outline(*elements, fill, spacing, top)
     loose = np.flatnonzero(present & ~fill)
     if len(loose):
-        place = np.clip(x[loose] / spacing, 0, len(top) - 1).astype(np.int64)
-        covered = np.zeros(len(x), dtype=bool)
-        covered[loose[y[loose] < top[place]]] = True
-        _raise_outline(x, y, radius, covered, spacing, top)
+        x, y = (place[loose] for place in centres(grains))
+        place = np.clip(x / spacing, 0, len(top) - 1).astype(np.int64)
+        covered = np.zeros(len(fill), dtype=bool)
+        covered[loose[y < top[place]]] = True
+        _raise_outline(*elements, covered, spacing, top)
         fill = fill | covered
     return Surface(top.reshape(bins, per_bin).mean(axis=1), fill, present & ~fill)
 

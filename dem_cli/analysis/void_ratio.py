@@ -1,4 +1,4 @@
-"""Solid area, void ratio and porosity of discs in a rectangle, with exact clipping (physics.md 1.8).
+"""Solid area, void ratio and porosity of grains in a rectangle, with exact clipping (physics.md 1.8).
 
 Both definitions of the void ratio are `void_ratio(total, solid)`:
 whole fill    total = container width x mean surface height, solid = grains of the fill inside the container;
@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from dem_cli.analysis.clipping import disc_in_rectangle, lens_in_rectangle
-from dem_cli.jit import kernel
-from dem_cli.state import Bools, Contacts, Floats
+from dem_cli.analysis.bodies import outlines, single
+from dem_cli.analysis.covered import covered_by_discs, covered_by_grains, shared_at_contacts
+from dem_cli.state import Bools, Contacts, Grains
 
 
 class Rectangle(NamedTuple):
@@ -51,27 +51,23 @@ def inner_window(width: float, depth: float, margins: WindowMargins) -> Rectangl
     return Rectangle(side, margins.bottom * depth, width - side, (1.0 - margins.top) * depth)
 
 
-@kernel()
-def _solid_area(x, y, radius, member, i, j, x0, y0, x1, y1):  # type: ignore[no-untyped-def]
-    solid = 0.0
-    for k in range(len(x)):
-        if member[k]:
-            solid += disc_in_rectangle(x[k], y[k], radius[k], x0, y0, x1, y1)
-    for c in range(len(i)):
-        a, b = i[c], j[c]
-        if b >= 0 and member[a] and member[b]:
-            solid -= lens_in_rectangle(x[a], y[a], radius[a], x[b], y[b], radius[b], x0, y0, x1, y1)
-    return solid
+def solid_area(grains: Grains, member: Bools, contacts: Contacts, window: Rectangle) -> float:
+    """Area [m^2] that the grains with member = True cover inside the window; member (n,) is the same for all elements of a grain.
 
-
-def solid_area(x: Floats, y: Floats, radius: Floats, member: Bools, contacts: Contacts, window: Rectangle) -> float:
-    """Area [m^2] that the grains with member = True cover inside the window; arrays of shape (n,).
-
-    Where two grains overlap the lens counts once. `contacts` must hold every pair that overlaps. Spots
-    common to three discs would be taken off too often; between equal discs they need overlaps beyond 13 %
-    of the diameter.
+    Exact for discs, for ellipses and for bodies of overlapping discs. Where two grains overlap the lens counts once: exactly for
+    discs, for ellipses as in `clipping.lens_at_contact`. `contacts` must hold every pair that overlaps. Spots common to three grains
+    would be taken off too often; between equal discs they need overlaps beyond 13 % of the diameter.
     """
-    return float(_solid_area(x, y, radius, member, contacts.i, contacts.j, *map(float, window)))
+    c, x, y, radius, body = contacts, grains.x, grains.y, grains.radius, grains.body
+    outline = outlines(grains)
+    sides = tuple(map(float, window))
+    if single(grains) and not outline[1].any() and not outline[2].any():
+        return float(covered_by_discs(x, y, radius, member, c.i, c.j, *sides))
+    solid = covered_by_grains(x, y, radius, *outline, body, member, *sides)
+    shared = shared_at_contacts(
+        x, y, radius, *outline, body, member, c.i, c.j, c.nx, c.ny, c.px, c.py, c.overlap, *sides
+    )
+    return float(solid - shared)
 
 
 def void_ratio(total: float, solid: float) -> float:

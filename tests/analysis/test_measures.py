@@ -11,7 +11,7 @@ from analysis_samples import THICKNESS, bed, discs, frame_of, overlaps
 
 from dem_cli.analysis.measures import measure_frame, series_row
 from dem_cli.results.schema import SERIES
-from dem_cli.state import Contacts
+from dem_cli.state import BondStrain, Contacts
 
 SHEAR = 300.0
 
@@ -29,7 +29,8 @@ def take(contacts, index):
 def test_row_holds_every_name_of_the_series_once():
     grains, width = bed()
     contacts = overlaps(grains.x, grains.y, grains.radius, width)
-    frame = frame_of(grains, contacts)
+    bonds = BondStrain(gap=np.array([0.1, -0.3]), slip=np.array([-0.5, 0.2]), roll=np.array([0.7, 0.6]))
+    frame = frame_of(grains, contacts, bonds)
     measures = measured(grains, width, contacts)
     row = series_row(frame, measures)
     assert set(row) == set(SERIES)
@@ -45,11 +46,23 @@ def test_engine_numbers_are_taken_over():
     row = series_row(frame_of(grains, None), measured(grains, width))
     assert (row["time"], row["step"], row["stage"], row["time_step"]) == (0.25, 7.0, 1.0, 1e-5)
     energies = "kinetic potential elastic_normal elastic_tangential friction dashpot_normal dashpot_tangential"
-    energies += " damping escaped_energy time_step_energy work"
-    assert [row[name] for name in energies.split()] == [0.5 + k for k in range(11)]
+    energies += " bond_energy damping escaped_energy time_step_energy work"
+    assert [row[name] for name in energies.split()] == [0.5 + k for k in range(12)]
     assert (row["residual"], row["energy_in"], row["unbalanced"]) == (-3.0, 40.0, 0.125)
     ground = [row[f"ground_{name}"] for name in ("x", "y", "vx", "vy", "ax", "ay")]
     assert ground == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+
+
+def test_bonds_give_their_largest_strain_in_magnitude():
+    grains, width = bed()
+    measures = measured(grains, width)
+    bonds = BondStrain(gap=np.array([0.1, -0.3]), slip=np.array([-0.5, 0.2]), roll=np.array([0.7, 0.6]))
+    row = series_row(frame_of(grains, None, bonds), measures)
+    assert (row["bond_gap"], row["bond_slip"], row["bond_roll"]) == (0.3, 0.5, 0.7)
+    empty = BondStrain(*(np.empty(0),) * 3)
+    for none in (None, empty):
+        row = series_row(frame_of(grains, None, none), measures)
+        assert all(math.isnan(row[f"bond_{name}"]) for name in ("gap", "slip", "roll"))
 
 
 def test_bed_of_a_lattice():
@@ -85,7 +98,8 @@ def test_renumbered_sample_has_the_same_measures():
     sign = np.where(swap, -1.0, 1.0)
     i, j = np.where(swap, j, i), np.where(swap, i, j)
     turned = replace(contacts, i=i, j=j, nx=sign * contacts.nx, ny=sign * contacts.ny)
-    second = measured(grains.take(order), width, take(turned, np.lexsort((j, i))))
+    renumbered = replace(grains.take(order), id=grains.id, body=grains.body)
+    second = measured(renumbered, width, take(turned, np.lexsort((j, i))))
     for name, value in first.row.items():
         assert second.row[name] == pytest.approx(value, rel=1e-9, abs=1e-9 * scale(name)), name
     np.testing.assert_allclose(second.eta, first.eta, rtol=1e-12)

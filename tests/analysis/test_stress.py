@@ -50,7 +50,7 @@ def test_compression_is_positive_in_every_direction():
     found = stress.window_stress(x, y, overlaps(x, y, radius), Rectangle(2.0, 2.0, 5.0, 5.0), 1.0)
     assert found[0, 0] > 0.0
     assert found[1, 1] > 0.0
-    assert np.all(stress.grain_stress(x, y, radius, overlaps(x, y, radius), 1.0)[:, [0, 3]] > 0.0)
+    assert np.all(stress.grain_stress(discs(x, y, radius), overlaps(x, y, radius), 1.0)[:, [0, 3]] > 0.0)
 
 
 def test_hydrostatic_column():
@@ -70,7 +70,7 @@ def test_hydrostatic_column():
 def test_column_by_grains_is_hydrostatic_too():
     r, n = 0.01, 20
     grains, c = column(n, r)
-    found = stress.grain_stress(grains.x, grains.y, grains.radius, c, THICKNESS)
+    found = stress.grain_stress(grains, c, THICKNESS)
     # mean of the forces below and above a grain, over its area
     weight = grains.mass[0] * G
     expected = weight * (n - np.arange(n) - 0.5) * 2 * r / (math.pi * r**2 * THICKNESS)
@@ -92,7 +92,7 @@ def test_stress_of_grains_adds_up_to_that_of_the_sample():
     c = overlaps(x, y, radius, width=10.0, shear=3e4)
     box = Rectangle(-5.0, -5.0, 15.0, 15.0)
     sample = stress.window_stress(x, y, c, box, 0.3) * box.area
-    grains = (stress.grain_stress(x, y, radius, c, 0.3) * (math.pi * radius**2)[:, None]).sum(axis=0)
+    grains = (stress.grain_stress(discs(x, y, radius), c, 0.3) * (math.pi * radius**2)[:, None]).sum(axis=0)
     np.testing.assert_allclose(grains.reshape(2, 2), sample, rtol=1e-10)
 
 
@@ -101,12 +101,12 @@ def test_asymmetry_is_the_moment_of_the_shear_forces():
     x, y = np.array([0.0, 2.0, -2.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 2.0, -2.0])
     radius = np.full(5, 1.0 + 1e-9)
     c = overlaps(x, y, radius, shear=7.0)
-    turned = stress.grain_stress(x, y, radius, c, 1.0)[0]
+    turned = stress.grain_stress(discs(x, y, radius), c, 1.0)[0]
     # sum of r x f over the contacts is 4 * 7 * 1 N m, for f on the neighbour (moment xy part: l_x f_y - l_y f_x)
     assert (turned[2] - turned[1]) * math.pi == pytest.approx(28.0, rel=1e-6)
     # shear of opposite signs on the two axes: balanced moments, pure shear stress
     signs = np.where(np.abs(c.nx) > 0.5, 1.0, -1.0)
-    balanced = stress.grain_stress(x, y, radius, replace(c, shear=7.0 * signs), 1.0)[0]
+    balanced = stress.grain_stress(discs(x, y, radius), replace(c, shear=7.0 * signs), 1.0)[0]
     assert balanced[2] == pytest.approx(balanced[1], rel=1e-6)
     assert abs(balanced[1]) * math.pi == pytest.approx(14.0, rel=1e-6)
 
@@ -134,8 +134,8 @@ def test_fabric_of_a_hexagonal_lattice_is_isotropic_and_walls_are_left_out():
 
 
 def test_coordination_counts_a_pair_twice_and_a_wall_once():
-    c = overlaps([0.9, 2.8, 9.0], [0.9, 0.9, 9.0], [1.0, 1.0, 0.5], width=20.0)
-    found = stress.coordination(3, c)
+    grains = discs([0.9, 2.8, 9.0], [0.9, 0.9, 9.0], [1.0, 1.0, 0.5])
+    found = stress.coordination(grains, overlaps(grains.x, grains.y, grains.radius, width=20.0))
     assert found.tolist() == [3, 2, 0]
     assert found.dtype == np.int64
 

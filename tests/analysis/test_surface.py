@@ -6,21 +6,23 @@ import math
 
 import numpy as np
 import pytest
-from analysis_samples import bed, hexagonal, overlaps
-from hypothesis import given, settings
+from analysis_samples import bed, discs, ellipses, hexagonal, overlaps, touching
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from dem_cli.analysis import surface
+from dem_cli.analysis.bodies import outlines
 from dem_cli.analysis.clusters import joined_to_bed
+from dem_cli.geometry.ellipse import outline
 
 
 def surface_of(x, y, r, width, bins=10, present=None):
     x, y = np.asarray(x, float), np.asarray(y, float)
     radius = np.broadcast_to(r, x.shape).astype(float)
     present = np.ones(len(x), bool) if present is None else present
-    return surface.find_surface(x, y, radius, present, overlaps(x, y, radius), width, bins)
+    return surface.find_surface(discs(x, y, radius), present, overlaps(x, y, radius), width, bins)
 
 
 def test_level_of_a_flat_hexagonal_bed():
@@ -45,6 +47,105 @@ def test_outline_is_the_highest_disc_at_every_place(seed):
         inside = np.abs(xs - x[k]) < r[k]
         top[inside] = np.maximum(top[inside], y[k] + np.sqrt(r[k] ** 2 - (xs[inside] - x[k]) ** 2))
     np.testing.assert_allclose(found.eta, top.reshape(8, -1).mean(axis=1), atol=0.01 * r.mean())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_outline_is_the_highest_ellipse_at_every_place(seed):
+    rng = np.random.default_rng(seed)
+    n, width = 150, 1.0
+    r, k = rng.uniform(0.01, 0.08, n), rng.choice([1.0, 1.3, 3.0, 5.0], n)
+    grains = ellipses(
+        rng.uniform(0, width, n), rng.uniform(0, 0.4, n), r * np.sqrt(k), r / np.sqrt(k), rng.uniform(0, math.pi, n)
+    )
+    found = surface.find_surface(grains, np.ones(n, bool), touching(grains), width, 8)
+    assert found.fill.sum() > 100
+    # every ellipse as a dense polygon, its height at the same samples by interpolation along its upper half
+    samples = 8 * math.ceil(width / 8 / (surface.SAMPLE * grains.radius.mean()))
+    xs = (np.arange(samples) + 0.5) / samples
+    top = np.zeros(len(xs))
+    t = np.linspace(0.0, math.tau, 20_001)
+    for g in np.flatnonzero(found.fill):
+        u, v = grains.a[g] * np.cos(t), grains.b[g] * np.sin(t)
+        c, s = math.cos(grains.angle[g]), math.sin(grains.angle[g])
+        x, y = grains.x[g] + u * c - v * s, grains.y[g] + u * s + v * c
+        left, right = int(np.argmin(x[:-1])), int(np.argmax(x[:-1]))
+        upper = np.arange(right, left + (len(t) - 1) * (left < right) + 1) % (len(t) - 1)
+        inside = (xs > x[left]) & (xs < x[right])
+        top[inside] = np.maximum(top[inside], np.interp(xs[inside], x[upper][::-1], y[upper][::-1]))
+    np.testing.assert_allclose(found.eta, top.reshape(8, -1).mean(axis=1), rtol=1e-6)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(0.3, 1.5), st.booleans(), st.floats(3.0, 4.0), st.floats(0.001, 0.2), st.floats(0.0, 1.0))
+def test_nothing_above_a_steep_ellipse_is_taken_for_hidden(angle, falling, x, inwards, above):
+    """A small disc above the end of a steep ellipse, where the outline rises most within a column of samples."""
+    angle = -angle if falling else angle
+    m, p, q = outline(3.0, 0.6, angle)
+    end = math.copysign(math.sqrt(m + p), -q)
+    at = end - math.copysign(inwards, end)
+    disc_y = 5.0 + q / (m + p) * at + above
+    grains = ellipses([x, x + at], [5.0, disc_y], [3.0, 0.05], [0.6, 0.05], [angle, 0.0])
+    spacing = 1 / 32
+    top = np.zeros(256)
+    surface._raise_outline(grains.x, grains.y, grains.radius, *outlines(grains), np.ones(2, bool), spacing, top)
+    d = (np.arange(256)[:, None] + 0.5) * spacing - grains.x
+    m, p, q = outlines(grains)
+    reach = m + p - d * d
+    height = grains.y + (q * d + grains.a * grains.b * np.sqrt(np.maximum(reach, 0.0))) / (m + p)
+    np.testing.assert_allclose(top, np.where(reach > 0.0, height, 0.0).max(axis=1), rtol=1e-12)
+
+
+def test_ellipses_of_equal_axes_have_the_surface_of_discs():
+    grains, width = bed(seed=6)
+    contacts = overlaps(grains.x, grains.y, grains.radius, width)
+    present = np.ones(len(grains), bool)
+    r, angle = grains.radius, np.linspace(0.0, 6.0, len(grains))
+    disc = surface.find_surface(grains, present, contacts, width, 10)
+    for more in (0.0, 1e-14):
+        ellipse = ellipses(grains.x, grains.y, r * (1.0 + more), r, angle)
+        found = surface.find_surface(ellipse, present, contacts, width, 10)
+        np.testing.assert_allclose(found.eta, disc.eta, rtol=1e-9 if more else 1e-15)
+        assert np.array_equal(found.fill, disc.fill)
+
+
+@pytest.mark.parametrize(("gap", "joined"), [(0.99, True), (1.01, False)])
+@pytest.mark.parametrize(("angle", "low"), [(0.0, 0.5), (0.5 * math.pi, 2.0), (0.7, None)])
+def test_ellipse_joins_the_floor_with_its_lowest_point(angle, low, gap, joined):
+    low = low or math.hypot(2.0 * math.sin(angle), 0.5 * math.cos(angle))
+    grains = ellipses([2.0, 7.0, 12.0], [0.5, low + gap * surface.NEAR, 30.0], 2.0, 0.5, [0.0, angle, 0.0])
+    found = surface.find_surface(grains, np.ones(3, bool), touching(grains), 14.0, 7)
+    assert found.fill.tolist() == [True, joined, False]
+
+
+def gap_of_ellipses(grains, i, j, directions=5000):
+    """Largest n.delta - h_i - h_j over many directions: below the true gap by 1e-6 of the distance at most."""
+    t = np.arange(directions) * (math.tau / directions)
+    gap = (grains.x[j] - grains.x[i]) * np.cos(t) + (grains.y[j] - grains.y[i]) * np.sin(t)
+    for k in (i, j):
+        gap -= np.hypot(grains.a[k] * np.cos(t - grains.angle[k]), grains.b[k] * np.sin(t - grains.angle[k]))
+    return float(gap.max())
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.integers(1, 25), st.floats(0.5, 8.0), st.floats(0.0, 0.3))
+def test_bed_of_ellipses_is_the_graph_of_all_near_pairs(seed, n, spread, gap):
+    rng = np.random.default_rng(seed)
+    r, k = rng.uniform(0.05, 0.6, n), rng.choice([1.0, 1.5, 5.0], n)
+    place = rng.uniform(0, spread, n), rng.uniform(0, 2 * spread, n)
+    grains = ellipses(*place, r * np.sqrt(k), r / np.sqrt(k), rng.uniform(0, math.pi, n))
+    present = rng.random(n) < 0.85
+    near = np.zeros((n, n), bool)
+    for i in range(n):
+        for j in range(i):
+            apart = gap_of_ellipses(grains, i, j)
+            assume(abs(apart - gap) > 1e-5)
+            near[i, j] = present[i] and present[j] and apart < gap
+    label = connected_components(coo_matrix(near), directed=False)[1]
+    low = np.hypot(grains.a * np.sin(grains.angle), grains.b * np.cos(grains.angle))
+    of_bed = np.isin(label, label[present & (grains.y - low < gap)])
+    of_bed |= 2 * np.bincount(label[present], minlength=n)[label] > present.sum()
+    c = touching(grains)
+    np.testing.assert_array_equal(joined_to_bed(grains, present, c.i, c.j, gap), of_bed & present)
 
 
 def test_lone_disc_and_empty_bins():
@@ -91,7 +192,7 @@ def test_near_grain_joins_the_largest_cluster_from_every_side(turn):
     x = np.array([middle, middle + 0.01, middle - 0.01, middle + 2.05 * math.cos(turn), 50.0])
     y = np.array([middle, middle, middle, middle + 2.05 * math.sin(turn), 50.0])
     c = overlaps(x[:3], y[:3], np.ones(3))
-    joined = joined_to_bed(x, y, np.ones(5), np.ones(5, bool), c.i, c.j, gap)
+    joined = joined_to_bed(discs(x, y, 1.0), np.ones(5, bool), c.i, c.j, gap)
     assert joined.tolist() == [True] * 4 + [False]
 
 
@@ -99,7 +200,7 @@ def test_grains_at_the_same_wall_are_not_joined_by_it():
     x, y, radius = np.array([0.9, 0.9, 0.9]), np.array([1.0, 6.0, 11.0]), np.ones(3)
     c = overlaps(x, y, radius, width=10.0)
     assert c.j.tolist() == [-1, -1, -1]
-    found = surface.find_surface(x, y, radius, np.ones(3, bool), c, 10.0, 4)
+    found = surface.find_surface(discs(x, y, radius), np.ones(3, bool), c, 10.0, 4)
     assert found.airborne.tolist() == [False, True, True]
 
 
@@ -152,13 +253,13 @@ def test_bed_is_the_graph_of_all_near_pairs(seed, n, spread, gap):
     of_bed = np.isin(label, label[floor])
     of_bed |= 2 * np.bincount(label[present], minlength=n)[label] > present.sum()
     c = overlaps(x, y, radius)
-    np.testing.assert_array_equal(joined_to_bed(x, y, radius, present, c.i, c.j, gap), of_bed & present)
+    np.testing.assert_array_equal(joined_to_bed(discs(x, y, radius), present, c.i, c.j, gap), of_bed & present)
 
 
 def test_grains_far_apart_need_no_huge_grid():
     x, y = np.array([0.0, 1e9, 1e9 + 1.5]), np.array([0.5, 1e12, 1e12])
     none = np.zeros(0, np.int64)
-    joined = joined_to_bed(x, y, np.ones(3), np.ones(3, bool), none, none, 0.1)
+    joined = joined_to_bed(discs(x, y, 1.0), np.ones(3, bool), none, none, 0.1)
     assert joined.tolist() == [True, True, True]
 
 

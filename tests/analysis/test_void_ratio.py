@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from analysis_samples import overlaps
+from analysis_samples import discs, overlaps
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -26,7 +26,7 @@ offset = st.floats(0.0, 2.0)
 
 def solids(x, y, r, window):
     radius = np.full(len(x), r)
-    return solid_area(x, y, radius, np.ones(len(x), bool), overlaps(x, y, radius), window)
+    return solid_area(discs(x, y, radius), np.ones(len(x), bool), overlaps(x, y, radius), window)
 
 
 @settings(max_examples=50, deadline=None)
@@ -76,20 +76,20 @@ def test_union_of_overlapping_discs_against_a_raster(seed):
     for k in range(n):
         covers += (u[:, None] - x[k]) ** 2 + (v[None, :] - y[k]) ** 2 < radius[k] ** 2
     assert covers.max() == 2
-    found = solid_area(x, y, radius, np.ones(n, bool), overlaps(x, y, radius), window)
+    found = solid_area(discs(x, y, radius), np.ones(n, bool), overlaps(x, y, radius), window)
     assert found == pytest.approx((covers > 0).mean() * window.area, rel=2e-4)
 
 
 def test_only_members_count():
     x, y, radius = np.array([0.0, 1.5, 3.0]), np.zeros(3), np.ones(3)
     everywhere = Rectangle(-math.inf, -math.inf, math.inf, math.inf)
-    area = solid_area(x, y, radius, np.array([True, True, False]), overlaps(x, y, radius), everywhere)
+    area = solid_area(discs(x, y, radius), np.array([True, True, False]), overlaps(x, y, radius), everywhere)
     assert area == pytest.approx(2.0 * math.pi - lens_area(1.5, 1.0, 1.0))
 
 
 def test_what_is_pressed_into_a_wall_is_no_solid_of_the_container():
     x, y, radius = np.array([0.9, 5.0]), np.array([5.0, 0.0]), np.ones(2)
-    area = solid_area(x, y, radius, np.ones(2, bool), overlaps(x, y, radius, width=10.0), container(10.0))
+    area = solid_area(discs(x, y, radius), np.ones(2, bool), overlaps(x, y, radius, width=10.0), container(10.0))
     cap = math.acos(0.9) - 0.9 * math.sqrt(1.0 - 0.81)
     assert area == pytest.approx(1.5 * math.pi - cap, abs=1e-14)
 
