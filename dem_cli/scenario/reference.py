@@ -116,7 +116,9 @@ def _value(field: FieldInfo, inner: type[Table] | None) -> str:
 
 
 def _short(table: type[Table]) -> str:
-    return "length" if (table.short_form or {}).get("type") == "string" else "number"
+    """What the short form of a table is: a quantity has a pattern, and a name has none."""
+    form = table.short_form or {}
+    return ("length" if "pattern" in form else "text") if form.get("type") == "string" else "number"
 
 
 def _parts(kind: Any) -> list[Any]:
