@@ -101,8 +101,9 @@ def about_record(motion: dict[str, Any]) -> list[tuple[str, str]]:
         """Velocity and displacement at the end; what is rounding alone is zero."""
         pair = []
         for what, unit in (("velocity", "cm/s"), ("displacement", "cm")):
-            value = 100.0 * one[f"residual_{what}{when}"]
-            pair.append(f"{0.0 if abs(value) < 1e-7 * one[f"peak_{what}"] else value:.3g} {unit}")
+            value = one[f"residual_{what}{when}"]
+            value = 0.0 if abs(value) < 1e-9 * one[f"peak_{what}"] else value
+            pair.append(f"{100.0 * value:.3g} {unit}")
         return " and ".join(pair)
 
     lines = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -70,13 +70,11 @@ def motion_of(stored: StoredMotion | None) -> Motion | None:
     if stored is None:
         return None
     facts = stored.facts
-    records = tuple(
-        Record(**{one.name: _known(given.get(one.name)) for one in fields(Record)}) for given in facts["components"]
-    )
+    records = tuple(Record(*(_known(given.get(one.name)) for one in fields(Record))) for given in facts["components"])
     return Motion(facts["interval"], facts["begin"], facts["duration"], facts["baseline"], records)
 
 
-def _known(value: str | float | None) -> str | float:
+def _known(value: Any) -> Any:
     return math.nan if value is None else value
 
 
@@ -93,7 +91,11 @@ def draw_motion(results: Results, window: tuple[float, float], text: str) -> Fig
         "velocity": {axis: np.asarray(results.series[f"ground_v{axis}"])[inside] for axis in "xy"},
         "displacement": {axis: np.asarray(results.series[f"ground_{axis}"])[inside] for axis in "xy"},
     }
-    moving = [axis for axis in "xy" if any(np.any(one[axis] != 0.0) for one in columns.values())] or ["x"]
+    # What rounding leaves of a direction is no motion.
+    sizes = {axis: [largest(one[axis]) for one in columns.values()] for axis in "xy"}
+    moving = [k for k in "xy" if any(a > 1e-9 * max(b) for a, *b in zip(sizes[k], *sizes.values(), strict=True))] or [
+        "x"
+    ]
     figure = new_figure(7.0, 6.0)
     panels = figure.subplots(3, 1, sharex=True)
     for panel, (name, values) in zip(panels, columns.items(), strict=True):

@@ -228,6 +228,8 @@ def _sloshing(s: Sloshing, *, recorded: bool = False) -> Block:
         ("  beside the driving", free if math.isfinite(s.free_period) else "none"),
         ("largest mode amplitude", with_unit(s.mode_largest, "m", ".3g")),
     ]
+    if recorded:  # no single oscillation drives it, and none was taken out
+        del rows[-2]
     return Block("Sloshing (a liquid's formula is a reference line for grains)", (), tuple(rows), left=2)
 
 

@@ -60,7 +60,7 @@ class ComponentFacts:
     significant_duration: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GroundMotion:
     """The motion of a stage. acceleration (n, 2) [m/s^2] along the stage's angle and at right angles to it, every `interval` [s]
     from `begin` [s] on; zero before and behind. duration [s]: of the stage. components: one or two."""
@@ -71,6 +71,14 @@ class GroundMotion:
     baseline: str
     acceleration: Floats
     components: tuple[ComponentFacts, ...]
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, GroundMotion) or self.facts() != other.facts():
+            return False
+        return bool(np.array_equal(self.acceleration, other.acceleration))
+
+    def __hash__(self) -> int:
+        return hash(self.acceleration.tobytes())
 
     def facts(self) -> dict[str, Any]:
         """What there is to tell, as plain data; None where something is not defined."""
@@ -85,9 +93,7 @@ def ground_motion(record: Record, duration: float | None, folder: Path) -> Groun
     RecordError: a file that cannot be used, or a key that does not fit it.
     """
     wanted: list[Component] = [record] if record.second is None else [record, record.second]
-    raws = [
-        _read(one, one.file or record.file, folder, ("", "second.")[k]) for k, one in enumerate(wanted)
-    ]
+    raws = [_read(one, one.file or record.file, folder, ("", "second.")[k]) for k, one in enumerate(wanted)]
     steps = [raw.interval * record.time_scale for raw in raws]
     step = record.resample or min(steps)
     room = math.inf if duration is None else duration - 2.0 * record.pad
@@ -127,10 +133,9 @@ def _cut(raw: RawRecord, own: float, step: float, record: Record, room: float, p
     if left < FEWEST:
         rule = f"leaves nothing of {raw.name}, which lasts {raw.duration:g} s"
         raise RecordError(rule, "Begin earlier", "start")
-    if abs(step - own) <= 1e-9 * own:
-        values = raw.acceleration[first:]
-    else:
-        values = resampled(raw.acceleration[first:], own, step)
+    values = raw.acceleration[first:]
+    if abs(step - own) > 1e-9 * own:
+        values = resampled(values, own, step)
     if math.isfinite(room):
         values = values[: max(math.floor(room / step * (1.0 + 1e-12) + 1e-9) + 1, 0)]
     if len(values) < FEWEST:
@@ -153,14 +158,15 @@ def resampled(values: Floats, old: float, new: float) -> Floats:
     reach = LOBES / cut
     places = np.arange(count) * (new / old)
     around = np.arange(-math.ceil(reach), math.ceil(reach) + 1)
+    lags = np.linspace(0.0, reach + 1.0, 8193)  # the Bessel function takes long: from a table, to 1e-7
+    kaiser = np.i0(BETA * np.sqrt(1.0 - (lags / lags[-1]) ** 2))
     out = np.empty(count)
     some = max(400_000 // len(around), 1)  # so that the table of neighbours stays small
     for begin in range(0, count, some):
         here = places[begin : begin + some]
         nearest = np.round(here).astype(np.int64)[:, None] + around
         away = here[:, None] - nearest
-        window = np.i0(BETA * np.sqrt(np.clip(1.0 - (away / (reach + 1.0)) ** 2, 0.0, None)))
-        weight = np.sinc(cut * away) * window
+        weight = np.sinc(cut * away) * np.interp(np.abs(away), lags, kaiser)
         weight /= weight.sum(axis=1, keepdims=True)
         out[begin : begin + some] = np.sum(weight * values[np.clip(nearest, 0, len(values) - 1)], axis=1)
     return out
@@ -191,16 +197,18 @@ def _corrected(raw: Floats, window: Floats, step: float, degree: int, prefix: st
     if np.linalg.matrix_rank(ends) < len(ends):
         raise RecordError("has too few samples for this baseline", 'Take baseline = "mean"', f"{prefix}file")
     solve = np.linalg.pinv(ends)
+
+    def at_rest(moving: Floats) -> Floats:
+        velocity, displacement = integrals(step, moving)
+        left = np.array([velocity[-1] / span, displacement[-1] / span**2])[: len(ends)]
+        return np.asarray(moving - (solve @ left) @ basis)
+
+    motion = at_rest(motion)
     free = np.linalg.svd(ends)[2][len(ends) :]  # combinations that leave the ends as they are
     if len(free):
-        shapes = (free @ velocities).T
         velocity = integrals(step, motion)[0]
-        motion = motion - np.linalg.lstsq(shapes, velocity, rcond=None)[0] @ free @ basis
-    for _ in range(2):  # the second time takes the rounding of the first away
-        velocity, displacement = integrals(step, motion)
-        left = np.array([velocity[-1] / span, displacement[-1] / span**2])[: len(ends)]
-        motion = motion - (solve @ left) @ basis
-    return motion
+        motion = motion - np.linalg.lstsq((free @ velocities).T, velocity, rcond=None)[0] @ free @ basis
+    return at_rest(motion)  # the rounding of what went before
 
 
 def _factors(wanted: list[Component], motions: list[Floats]) -> list[float]:
@@ -210,7 +218,9 @@ def _factors(wanted: list[Component], motions: list[Floats]) -> list[float]:
         peak = float(np.abs(motion).max())
         if one.peak is not None:
             if peak == 0.0:
-                raise RecordError("cannot be reached: the record is zero", "Take another record", "second.peak" if k else "peak")
+                raise RecordError(
+                    "cannot be reached: the record is zero", "Take another record", "second.peak" if k else "peak"
+                )
             factors.append(one.peak / peak)
         else:
             factors.append(one.scale if one.scale is not None else (factors[0] if k else 1.0))

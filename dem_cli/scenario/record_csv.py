@@ -65,11 +65,12 @@ def read_csv(
     units = head.units or [""] * columns
     time = _time_column(names, units, table, head, told=interval is not None or head.interval is not None)
     chosen = _chosen(column, names, time)
+    values = enough(table[:, chosen], places[-1])
     value, said_unit = _unit_of(units[chosen], head, unit)
     step, said_step = _interval(table, time, texts, places, units, head, interval)
     label = names[chosen] if head.names else f"column {chosen + 1}"
     understood = "; ".join([f"{len(table)} samples of {label} in {said_unit}", said_step, *head.said])
-    return RawRecord(name, "csv", label, step, enough(table[:, chosen] * value, places[-1]), understood)
+    return RawRecord(name, "csv", label, step, values * value, understood)
 
 
 def _cells(text: str, separator: str) -> list[str]:
@@ -128,7 +129,9 @@ def _meta(text: str, line: int, head: _Head) -> bool:
             given = found[1] or found[3] or assumed
             factor, amount = unit_value(given, unit), float(found[2])
             if factor is None or amount <= 0.0:
-                raise RecordError(f'line {line}: "{found[0].strip()}" gives no interval', "Write for example dt = 0.01 s")
+                raise RecordError(
+                    f'line {line}: "{found[0].strip()}" gives no interval', "Write for example dt = 0.01 s"
+                )
             head.interval = amount * factor if unit == "s" else 1.0 / (amount * factor)
             head.interval_line = line
             known = True
@@ -187,13 +190,11 @@ def _chosen(column: str | None, names: list[str], time: int | None) -> int:
         raise RecordError("holds times alone", "Add a column of accelerations")
     if column is None:
         return others[0]
-    for k, name in enumerate(names):
-        if name.casefold() == column.strip().casefold():
-            break
-    else:
-        if not column.strip().isdigit() or not 1 <= int(column) <= len(names):
-            raise RecordError("is no column of the file", did_you_mean(column, [names[k] for k in others]), "column")
-        k = int(column) - 1
+    named = [k for k, name in enumerate(names) if name.casefold() == column.strip().casefold()]
+    counted = column.strip().isdigit() and 1 <= int(column) <= len(names)
+    if not named and not counted:
+        raise RecordError("is no column of the file", did_you_mean(column, [names[k] for k in others]), "column")
+    k = named[0] if named else int(column) - 1
     if k == time:
         raise RecordError("is the time", f"Take {' or '.join(names[n] for n in others)}", "column")
     return k

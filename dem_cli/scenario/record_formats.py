@@ -116,7 +116,7 @@ def read_knet(name: str, lines: list[str]) -> RawRecord:
     memo = next((k for k, text in enumerate(lines[:HEADER_LINES]) if text.startswith("Memo")), None)
     if memo is None:
         raise RecordError("line 17: the line Memo. is missing, which ends the header of a K-NET file", FETCH_AGAIN)
-    header = {k: text for k, text in enumerate(lines[:memo], 1)}
+    header = dict(enumerate(lines[:memo], 1))
 
     def value(keyword: str, expected: int) -> tuple[int, str]:
         for line, text in header.items():
@@ -141,7 +141,9 @@ def read_knet(name: str, lines: list[str]) -> RawRecord:
         more = f"goes on beyond the {wanted}" if len(values) > wanted else f"ends after {len(values)} of the {wanted}"
         raise RecordError(f"line {where}: the record {more} samples that line {line} announces", FETCH_AGAIN)
     acceleration = enough(values, len(lines)) * scale
-    direction, station = (next((t[18:].strip() for t in header.values() if t.startswith(w)), "") for w in ("Dir.", "Station Code"))
+    direction, station = (
+        next((t[18:].strip() for t in header.values() if t.startswith(w)), "") for w in ("Dir.", "Station Code")
+    )
     mean = float(acceleration.mean())
     understood = f"{wanted} samples at {rate:g} Hz, scale factor {found[0]}, zero at {mean * 100.0:.4g} gal"
     if said := _other_maximum(header, float(np.abs(acceleration - mean).max())):

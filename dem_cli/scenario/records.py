@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
-from dem_cli.scenario.quantities import Acceleration, Duration, DurationOrZero, JsonSchema, Number, Quantity
+from dem_cli.scenario.quantities import Duration, DurationOrZero, JsonSchema, Number, Quantity
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
 Peak = Annotated[float, Quantity(gt=0.0, unit="m/s^2", example="400 gal")]

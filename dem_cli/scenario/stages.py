@@ -86,7 +86,7 @@ class Shake(Table):
     alternatives: ClassVar = ((("amplitude", "frequency"), ("record",)), (("duration",), ("cycles",), ()))
     more_schema: ClassVar[JsonSchema] = {
         "if": {"required": ["record"]},
-        "then": {"not": {"anyOf": [{"required": [name]} for name in ("amplitude", "frequency", "cycles", "ramp")]}},
+        "then": {"not": {"anyOf": [{"required": [name]} for name in ("amplitude", "frequency", "cycles")]}},
         "else": {"oneOf": [{"required": ["duration"]}, {"required": ["cycles"]}]},
     }
 
@@ -101,7 +101,7 @@ class Shake(Table):
                 ("cycles", "Write duration in its place"),
                 ("ramp", "Write taper in the record's table in its place"),
             ):
-                if name in raw and "amplitude" not in raw:
+                if name in raw and good.get(name) and "amplitude" not in raw:
                     yield Mistake((name,), "is of a sine, and contradicts record", remedy)
             rest = 2.0 * good["record"].pad if good.get("record") else 0.0
             if good.get("duration") and rest >= good["duration"]:
