@@ -70,7 +70,7 @@ class Record(Component):
         1.0, "factor on the record's times, for tests of models: 0.1 makes it ten times faster", example=0.1
     )
 
-    short_form: ClassVar[JsonSchema | None] = {"type": "string", "description": "the file, taken as it is"}
+    short_form: ClassVar[JsonSchema | None] = {"type": "string", "minLength": 1, "description": "the file alone"}
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:

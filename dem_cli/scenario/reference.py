@@ -116,9 +116,9 @@ def _value(field: FieldInfo, inner: type[Table] | None) -> str:
 
 
 def _short(table: type[Table]) -> str:
-    """What the short form of a table is: a quantity has a pattern, and a name has none."""
+    """What the short form of a table is; of texts, those with a least length are names, and the others quantities."""
     form = table.short_form or {}
-    return ("length" if "pattern" in form else "text") if form.get("type") == "string" else "number"
+    return ("text" if "minLength" in form else "length") if form.get("type") == "string" else "number"
 
 
 def _parts(kind: Any) -> list[Any]:
