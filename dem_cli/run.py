@@ -15,7 +15,7 @@ from dem_cli.engines.explicit.engine import ExplicitEngine
 from dem_cli.errors import RunError
 from dem_cli.interrupts import marked_interrupts
 from dem_cli.results import ResultWriter
-from dem_cli.scenario import Scenario
+from dem_cli.scenario import Scenario, Shake
 from dem_cli.state import Frame
 
 # Told of every frame, with its row of the series where it has one.
@@ -38,6 +38,9 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
         depth=scenario.depth, container={"width": container.width, "height": container.height},
         tracks=np.array(output.tracks.grains) if output.tracks else None, surface_x=surface_x, force=force,
     ) as writer:  # fmt: skip
+        for number, stage in enumerate(scenario.stages, 1):
+            if isinstance(stage, Shake) and stage.motion:
+                writer.add_motion(number, stage.motion.acceleration, stage.motion.facts())
         row: dict[str, float] | None = None
         try:
             for frame in engine.frames():

@@ -45,6 +45,42 @@ def test_writes_where_it_is_told(folder: Path, target: str) -> None:
     assert tomllib.loads(written.read_text())["grains"]["count"] == 500
 
 
+RECORDS = ("synthetic-horizontal.at2", "synthetic-vertical.csv")
+
+
+def test_writes_the_files_that_a_scenario_reads(folder: Path) -> None:
+    (folder / "sub").mkdir()
+    result = CliRunner().invoke(main, ["init", "shake-record", "-o", "sub/mine.toml"])
+    assert (result.exit_code, result.stdout.splitlines()) == (
+        0,
+        ["sub/mine.toml", *(f"sub/{name}" for name in RECORDS)],
+    )
+    for name in RECORDS:
+        assert (folder / "sub" / name).read_bytes() == (ROOT / "scenarios" / name).read_bytes()
+    assert CliRunner().invoke(main, ["check", "sub/mine.toml"]).exit_code == 0
+
+
+def test_files_that_are_there_already(folder: Path) -> None:
+    """The same file is no obstacle; another one of that name is, and then nothing is written."""
+    assert CliRunner().invoke(main, ["init", "shake-record"]).exit_code == 0
+    assert CliRunner().invoke(main, ["init", "shake-record", "-o", "mine.toml"]).exit_code == 0
+    (folder / RECORDS[0]).write_text("mine")
+    result = CliRunner().invoke(main, ["init", "shake-record", "-o", "other.toml"])
+    assert (result.exit_code, f"{RECORDS[0]}: exists" in result.stderr) == (2, True)
+    assert not (folder / "other.toml").exists()
+    assert (folder / RECORDS[0]).read_text() == "mine"
+    assert CliRunner().invoke(main, ["init", "shake-record", "-o", "other.toml", "--force"]).exit_code == 0
+    assert (folder / RECORDS[0]).read_text() != "mine"
+
+
+def test_files_of_scenarios_are_shipped() -> None:
+    """pyproject.toml lists the suffixes of what goes into the package."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    suffixes = {Path(pattern).suffix for pattern in settings["package-data"]["dem_cli.shipped"]}
+    assert {Path(name).suffix for one in shipped_scenarios() for name in one.files} <= suffixes
+    assert {path.suffix for path in (ROOT / "scenarios").iterdir() if path.is_file()} <= suffixes
+
+
 def test_overwrites_only_when_forced(folder: Path) -> None:
     (folder / "shake-quick.toml").write_text("mine")
     result = CliRunner().invoke(main, ["init", "shake-quick"])

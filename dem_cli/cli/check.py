@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -81,6 +81,7 @@ def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
         time = human(stage.longest, "s")
         time = f"about {human(stage.expected, 's', 2)}, at most {time}" if stage.kind == "settle" else time
         lines.append((f"stage {stage.number}", f"{title}: {time}, {counted(stage.steps)} steps"))
+        lines += about_record(stage.record) if stage.record else []
     return [
         *lines,
         ("expected", f"{counted(d.steps)} steps, result file {human(d.file_bytes, 'B', 2)}"),
@@ -123,6 +124,45 @@ def grain_rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
                 f"C dt/m_eff from {d.bond_lambda[0]:.3g} to {d.bond_lambda[2]:.3g}  (implicit: any is stable)",
             ),
             ("  expected creep", f"{d.bond_creep:.1e} of a radius under the weight of the bed"),
+        ]
+    return lines
+
+
+def about_record(motion: dict[str, Any]) -> list[tuple[str, str]]:
+    """Lines about the recorded motion of a stage."""
+    from dem_cli.scenario.record_formats import FORMATS
+
+    def left(one: dict[str, Any], when: str) -> str:
+        """Velocity and displacement at the end; what is rounding alone is zero."""
+        pair = []
+        for what, unit in (("velocity", "cm/s"), ("displacement", "cm")):
+            value = one[f"residual_{what}{when}"]
+            value = 0.0 if abs(value) < 1e-9 * one[f"peak_{what}"] else value
+            pair.append(f"{100.0 * value:.3g} {unit}")
+        return " and ".join(pair)
+
+    lines = []
+    for label, one in zip(("  record", "  second"), motion["components"], strict=False):
+        name = f"{one['name']} ({one['component']})" if one["component"] else one["name"]
+        period, within = one["predominant_period"], one["significant_duration"]
+        lines += [
+            (label, f"{name}, {FORMATS[one['format']]}: {one['understood']}"),
+            (
+                "    peak",
+                f"{100.0 * one['recorded_peak']:.4g} gal recorded; {100.0 * one['peak']:.4g} gal, "
+                f"{100.0 * one['peak_velocity']:.3g} cm/s, {100.0 * one['peak_displacement']:.3g} cm used",
+            ),
+            (
+                "    at the end",
+                f"{left(one, '_before')} as recorded; {left(one, '')} used (baseline: {motion['baseline']})",
+            ),
+            (
+                "    period",
+                "none, nothing moves"
+                if period is None
+                else f"{human(period, 's', 3)} predominant; Arias intensity {one['arias']:.3g} m/s, "
+                f"{human(within, 's', 3)} from 5 to 95 % of it",
+            ),
         ]
     return lines
 

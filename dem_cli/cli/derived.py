@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from dem_cli.scenario import Scenario, Settle
+from dem_cli.scenario import Scenario, Settle, Shake
 from dem_cli.scenario.restitution import restitution
 from dem_cli.state import Floats
 
@@ -21,7 +22,7 @@ Spread = tuple[float, float, float]  # smallest, mean, largest
 
 @dataclass(frozen=True)
 class StagePlan:
-    """A stage before it is run: longest and expected time [s], and expected steps."""
+    """A stage before it is run: longest and expected time [s], expected steps, and what there is to tell of its record."""
 
     number: int
     kind: str
@@ -29,6 +30,7 @@ class StagePlan:
     longest: float
     expected: float
     steps: int
+    record: dict[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -167,7 +169,10 @@ def _plan(scenario: Scenario, dt: float) -> list[StagePlan]:
     for number, stage in enumerate(scenario.stages, 1):
         expected = _settling_time(scenario, first=number == 1) if isinstance(stage, Settle) else stage.longest
         expected = min(expected, stage.longest)
-        plans.append(StagePlan(number, stage.kind, stage.name, stage.longest, expected, math.ceil(expected / dt)))
+        facts = stage.motion.facts() if isinstance(stage, Shake) and stage.motion else None
+        plans.append(
+            StagePlan(number, stage.kind, stage.name, stage.longest, expected, math.ceil(expected / dt), facts)
+        )
     return plans
 
 
@@ -202,14 +207,30 @@ def _warnings(scenario: Scenario, overlap: float, creep: float | None) -> list[s
             f"bonds at the floor will give by about {creep:.1%} of a radius under the weight of the bed: raise their viscosities"
         )
     for number, stage in enumerate(scenario.stages, 1):
-        if stage.kind != "shake":
-            continue
-        if scenario.output.interval > 0.1 / stage.frequency:
-            said.append(
-                f"stage {number} shakes at {stage.frequency:g} Hz, and output.interval gives it less than ten rows a period"
-            )
-        if stage.amplitude > 0.0 and stage.longest * stage.frequency < 1.0:
-            said.append(f"stage {number} ends before its first period is over")
+        if isinstance(stage, Shake):
+            said += [f"stage {number} {words}" for words in _about_shaking(stage, scenario.output.interval)]
     if scenario.integration.integrator == "thesis" and max(scenario.contact.damping()) < 0.05:
         said.append('integrator = "thesis" gains energy, and there is little damping to take it away')
     return said
+
+
+def _about_shaking(stage: Shake, interval: float) -> Iterator[str]:
+    """What is odd about a shaking whose series has rows every `interval` [s]."""
+    if (motion := stage.motion) is not None:
+        for one in motion.components:
+            if interval > 0.1 * one.predominant_period:
+                yield (
+                    f"shakes at a predominant period of {one.predominant_period:.3g} s ({one.name}), and output.interval "
+                    "gives it less than ten rows"
+                )
+            if abs(one.residual_velocity) > 0.01 * one.peak_velocity:
+                yield (
+                    f"leaves the ground moving at {one.residual_velocity:.3g} m/s ({one.name}): "
+                    'record.baseline = "mean" ends at rest'
+                )
+        return
+    assert stage.frequency is not None
+    if interval > 0.1 / stage.frequency:
+        yield f"shakes at {stage.frequency:g} Hz, and output.interval gives it less than ten rows a period"
+    if stage.amplitude and stage.longest * stage.frequency < 1.0:
+        yield "ends before its first period is over"

@@ -20,7 +20,7 @@ import click
 @click.option(
     "--what",
     metavar="KIND",
-    help="sample, histories, trajectories, surface, energy or series [default: sample].",
+    help="sample, histories, trajectories, surface, energy, motion or series [default: sample].",
 )
 @click.option("--time", type=float, metavar="T", help="Sample: the frame nearest to T seconds.")
 @click.option("--frame", type=int, metavar="K", help="Sample: frame K from 0, or -1, -2, ... from the last.")
@@ -66,11 +66,12 @@ def command(
     trajectories  ways of tracked grains
     surface       free surface over place and time, and its antisymmetric mode
     energy        ledger of energy as stacked areas
+    motion        acceleration, velocity and displacement of the container
     series        any quantity of /series over time
 
     QUANTITY is radius, id, speed, spin, displacement, displacement_x, displacement_y, rotation, coordination,
     pressure, shear_stress, stress_xx, stress_yy or stress_xy; displacement and rotation count from the start
-    of the frame's stage. Histories, trajectories and surface show the last stage of shaking unless --stage
+    of the frame's stage. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.

@@ -16,7 +16,7 @@ from dem_cli.results import Results
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = ("sample", "histories", "trajectories", "surface", "energy", "series")
+KINDS = ("sample", "histories", "trajectories", "surface", "energy", "motion", "series")
 DEFAULT_SERIES = ("void_ratio", "depth", "coordination", "kinetic")
 
 
@@ -44,7 +44,7 @@ def draw(results: Results, picture: Picture) -> Figure:
     `look.style()`.
     """
     # Imported here so that one kind of picture does not load what only another needs.
-    from dem_cli.report import curves, sample, tracked
+    from dem_cli.report import curves, motions, sample, tracked
 
     check_request(picture)
     _check_file(results, picture)
@@ -68,6 +68,8 @@ def draw(results: Results, picture: Picture) -> Figure:
         )
     if picture.what == "surface":
         return curves.draw_surface(results, window, text, picture.limits)
+    if picture.what == "motion":
+        return motions.draw_motion(results, window, text)
     if picture.what == "energy":
         return curves.draw_energy(results, window, text)
     return curves.draw_series(results, picture.series, window, text)

@@ -17,6 +17,7 @@ import numpy as np
 
 from dem_cli import units
 from dem_cli.analysis.sloshing import surface_period, theory_period, thesis_period
+from dem_cli.report.motions import Motion, motion_of
 from dem_cli.results import Results, Stage
 from dem_cli.state import Floats
 
@@ -75,7 +76,8 @@ class Sloshing:
     [m].
 
     depth: before the stage. theory_T1..T3: linear theory at that depth; thesis_T1: the thesis' (7.2).
-    driving_period: of the shaking. period, amplitude: strongest oscillation of the surface mode cos(pi x/l);
+    driving_period: of the shaking; of a recorded motion the predominant period of its first component, which
+    nothing is taken out of the surface's motion for. period, amplitude: strongest oscillation of the surface mode cos(pi x/l);
     resolution [Hz] of the record and period_resolution [s]; ratio: period over driving period; free_period,
     free_amplitude: strongest beside the driving one; mode_largest: largest magnitude of the mode. reason: why
     no period was found, else empty.
@@ -103,7 +105,7 @@ class Sloshing:
 class StageSummary:
     """One stage. start, end [s] (NaN: not ended); before, after, change: MEASURES at its ends, `after` of a
     stage that has not ended being its last row; amplitude [m/s^2] and frequency
-    [Hz] of shaking.
+    [Hz] of a sine; motion: of a record.
 
     overlap_largest, airborne_largest: largest over all rows of the stage's series.
     """
@@ -116,6 +118,7 @@ class StageSummary:
     reason: str
     amplitude: float
     frequency: float
+    motion: Motion | None
     before: dict[str, float]
     after: dict[str, float]
     change: dict[str, float]
@@ -210,6 +213,7 @@ def _stage(results: Results, number: int, stage: Stage) -> StageSummary:
         reason=stage.reason,
         amplitude=_quantity(given, "amplitude", "m/s^2"),
         frequency=_quantity(given, "frequency", "Hz"),
+        motion=motion_of(results.motions.get(number)),
         before=before,
         after=after,
         change={name: after[name] - before[name] for name in MEASURES},
@@ -237,6 +241,8 @@ def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
         mean_radius=radius,
         driving_period=1.0 / frequency if frequency > 0.0 else None,
     )
+    motion = motion_of(results.motions.get(number))
+    driving = motion.period if motion else (1.0 / frequency if frequency > 0.0 else math.nan)
     width = results.width
     return Sloshing(
         depth=depth,
@@ -244,12 +250,12 @@ def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
         theory_T2=theory_period(2, width, depth, gravity),
         theory_T3=theory_period(3, width, depth, gravity),
         thesis_T1=thesis_period(width, depth, gravity),
-        driving_period=1.0 / frequency if frequency > 0.0 else math.nan,
+        driving_period=driving,
         period=found.period,
         amplitude=found.amplitude,
         resolution=found.resolution,
         period_resolution=found.period_resolution,
-        ratio=found.ratio,
+        ratio=found.period / driving,
         is_driving=found.is_driving,
         free_period=found.free_period,
         free_amplitude=found.free_amplitude,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import IO
 
 from dem_cli.report.look import display_unit
+from dem_cli.report.motions import FORMATS, Motion, Record
 from dem_cli.report.summary import EnergySummary, Run, Sloshing, StageSummary, Summary
 
 NOTHING = "-"
@@ -48,8 +49,10 @@ def blocks(summary: Summary) -> list[Block]:
     found = [_head(summary.run)]
     for stage in summary.stages:
         found.append(_stage(stage))
+        if stage.motion is not None:
+            found.append(_motion(stage.motion))
         if stage.sloshing is not None:
-            found.append(_sloshing(stage.sloshing))
+            found.append(_sloshing(stage.sloshing, recorded=stage.motion is not None))
     if summary.energy is not None:
         found.append(_energy(summary.energy))
     if summary.warnings:
@@ -101,6 +104,8 @@ def _row(summary: Summary) -> tuple[str, ...]:
 
 
 def _shaking(stage: StageSummary) -> str:
+    if stage.motion is not None:
+        return ", ".join(f"{one.name} {number(100.0 * one.peak, '.4g')} gal" for one in stage.motion.components)
     return f"{number(stage.amplitude * 100.0, '.4g')} gal {number(stage.frequency, '.4g')} Hz"
 
 
@@ -161,7 +166,48 @@ def _stage(stage: StageSummary) -> Block:
     return Block(title, ("", head, "change", ""), tuple(rows))
 
 
-def _sloshing(s: Sloshing) -> Block:
+def _motion(m: Motion) -> Block:
+    """Recorded and used motion, a column for each component."""
+
+    def row(label: str, *cells: str) -> tuple[str, ...]:
+        return (label, *cells)
+
+    def both(one: Record, when: str) -> str:
+        """Velocity and displacement at the end; what is rounding alone is zero."""
+        velocity, place = (getattr(one, f"residual_{what}{when}") for what in ("velocity", "displacement"))
+        velocity = 0.0 if abs(velocity) < 1e-9 * one.peak_velocity else velocity
+        place = 0.0 if abs(place) < 1e-9 * one.peak_displacement else place
+        return f"{number(100.0 * velocity, '.3g')} cm/s, {number(100.0 * place, '.3g')} cm"
+
+    parts = m.components
+    rows = (
+        row("component", *(one.component or NOTHING for one in parts)),
+        row("format", *(FORMATS.get(one.format, one.format) for one in parts)),
+        row("understood", *(one.understood for one in parts)),
+        row(
+            "recorded",
+            *(f"{in_seconds(one.recorded_duration)} every {in_seconds(one.recorded_interval)}" for one in parts),
+        ),
+        row("used", *(f"{in_seconds(m.duration)} every {in_seconds(m.interval)}" for _ in parts)),
+        row("peak, recorded", *(number(100.0 * one.recorded_peak, ".4g", "gal") for one in parts)),
+        row("peak, used", *(number(100.0 * one.peak, ".4g", "gal") for one in parts)),
+        row("  factor", *(number(one.factor, ".4g") for one in parts)),
+        row("  velocity", *(number(100.0 * one.peak_velocity, ".3g", "cm/s") for one in parts)),
+        row("  displacement", *(number(100.0 * one.peak_displacement, ".3g", "cm") for one in parts)),
+        row("left at the end, as recorded", *(both(one, "_before") for one in parts)),
+        row(f"left at the end, baseline {m.baseline}", *(both(one, "") for one in parts)),
+        row("predominant period", *(in_seconds(one.predominant_period) for one in parts)),
+        row("Arias intensity", *(number(one.arias, ".3g", "m/s") for one in parts)),
+        row("  5 to 95 % of it within", *(in_seconds(one.significant_duration) for one in parts)),
+    )
+    return Block("Recorded motion", ("", *(one.name for one in parts)), rows, left=1 + len(parts))
+
+
+def in_seconds(value: float) -> str:
+    return with_unit(value, "s")
+
+
+def _sloshing(s: Sloshing, *, recorded: bool = False) -> Block:
     def seconds(value: float) -> str:
         return number(value, ".4g", "s")
 
@@ -176,12 +222,14 @@ def _sloshing(s: Sloshing) -> Block:
             f"T1 {seconds(s.theory_T1)}, T2 {seconds(s.theory_T2)}, T3 {seconds(s.theory_T3)}",
         ),
         ("thesis' formula (7.2)", f"T1 {seconds(s.thesis_T1)}"),
-        ("driving period", seconds(s.driving_period)),
+        ("predominant period of the ground" if recorded else "driving period", seconds(s.driving_period)),
         ("period of the surface", found if math.isfinite(s.period) else f"none: {s.reason}"),
-        ("  over driving period", number(s.ratio, ".3f")),
+        ("  over that of the ground" if recorded else "  over driving period", number(s.ratio, ".3f")),
         ("  beside the driving", free if math.isfinite(s.free_period) else "none"),
         ("largest mode amplitude", with_unit(s.mode_largest, "m", ".3g")),
     ]
+    if recorded:  # no single oscillation drives it, and none was taken out
+        del rows[-2]
     return Block("Sloshing (a liquid's formula is a reference line for grains)", (), tuple(rows), left=2)
 
 

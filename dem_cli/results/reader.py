@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 
 from dem_cli.errors import ResultsError
+from dem_cli.results.motions import StoredMotion, read_motions
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, FRAMES, KIND_CONTACT, KIND_WALL_CONTACT, SERIES, TRACKS
 from dem_cli.results.vtkhdf import GROUND, read_energy
 from dem_cli.results.writer import partial_path
@@ -153,6 +154,11 @@ class Results:
     @cached_property
     def warnings(self) -> list[str]:
         return [str(text) for text in self._file["warnings"].asstr()[:]]
+
+    @cached_property
+    def motions(self) -> dict[int, StoredMotion]:
+        """Recorded motions by the number of their stage, from 1."""
+        return read_motions(self._file)
 
     @cached_property
     def tracks(self) -> Tracks | None:

@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 
 from dem_cli.errors import ResultsError, RunError
+from dem_cli.results.motions import write_motion
 from dem_cli.results.provenance import provenance
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, SERIES, STAGES, SURFACE, TRACKS
 from dem_cli.results.tables import TEXT, Table, describe, make_scale
@@ -173,6 +174,11 @@ class ResultWriter:
             dataset = group.create_dataset(key, data=np.asarray(getattr(walls, key), dtype=np.float64))
             describe(dataset, "1" if key == "friction" else "m", "friction" if key == "friction" else "end of the wall")
             dataset.dims[0].attach_scale(name)
+
+    def add_motion(self, number: int, acceleration: Floats, facts: Mapping[str, Any]) -> None:
+        """The recorded motion of stage `number`, counted from 1 (`motions.write_motion`)."""
+        with self._guard():
+            write_motion(self._file, number, acceleration, facts)
 
     def append_series(self, row: Mapping[str, float], eta: Floats) -> None:
         """row: exactly the names of schema.SERIES. eta: free surface in each bin [m], NaN where there is none."""

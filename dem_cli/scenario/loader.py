@@ -14,7 +14,11 @@ from dem_cli.scenario import mistakes
 from dem_cli.scenario.grain_file import SCALE, read_grain_file
 from dem_cli.scenario.model import Scenario, tracked_exist
 from dem_cli.scenario.overrides import apply_overrides
+from dem_cli.scenario.raw_record import RecordError
+from dem_cli.scenario.stages import Shake
 from dem_cli.scenario.table import NOTHING
+
+Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
 
 
 def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
@@ -46,7 +50,7 @@ def parse_scenario(
     folder = Path(folder)
     lines = apply_overrides(raw, overrides)
     scenario: Scenario | None = None
-    found: list[tuple[tuple[str | int, ...], Any, str, str]] = []
+    found: list[Found] = []
     try:
         scenario = Scenario.model_validate(raw)
     except ValidationError as error:
@@ -54,6 +58,7 @@ def parse_scenario(
             ctx = one["ctx"]
             found.append((one["loc"], one["input"], ctx["rule"], ctx["remedy"]))
     from_file = [] if any(one[0] == ("packing", "file") for one in found) else _packing_file(raw, folder, scenario)
+    from_file += _records(raw, folder, scenario)
     order = list(raw)
     found.sort(key=lambda one: order.index(str(one[0][0])) if one[0][0] in order else len(order))
     lines += [mistakes.line(origin, *one, raw) for one in found]
@@ -65,9 +70,31 @@ def parse_scenario(
     return scenario
 
 
-def _packing_file(
-    raw: dict[str, Any], folder: Path, scenario: Scenario | None
-) -> list[tuple[tuple[str | int, ...], Any, str, str]]:
+def _records(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> list[Found]:
+    """Reads the records of shaking into their stages; their mistakes, also where the scenario has others."""
+    found: list[Found] = []
+    tables = raw.get("stage")
+    for number, table in enumerate(tables if isinstance(tables, list) else []):
+        if not (isinstance(table, dict) and table.get("kind") == "shake" and "record" in table):
+            continue
+        try:
+            stage = scenario.stages[number] if scenario else Shake.model_validate(table)
+        except ValidationError:
+            continue
+        assert isinstance(stage, Shake)
+        try:
+            stage.read_record(folder)
+        except RecordError as error:
+            keys: tuple[str, ...] = ("record", *error.key.split("."))
+            keys = keys[:1] if isinstance(table["record"], str) else keys
+            value: Any = table
+            for key in keys:
+                value = value.get(key, NOTHING) if isinstance(value, dict) else NOTHING
+            found.append((("stage", number, *keys), value, error.rule, error.remedy))
+    return found
+
+
+def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> list[Found]:
     """Mistakes of the file of grains, and of keys that disagree with it."""
     packing = raw.get("packing")
     name = packing.get("file") if isinstance(packing, dict) else None
@@ -81,7 +108,7 @@ def _packing_file(
         return [(("packing", "file"), name, rule, remedy)]
     if scenario is None:
         return []
-    found: list[tuple[tuple[str | int, ...], Any, str, str]] = []
+    found: list[Found] = []
     count = scenario.grains.count
     if count is not None and count != len(grains.x):
         rule = f"differs from the {len(grains.x)} grains of {name}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -113,13 +113,13 @@ class Scenario(Table):
 
     @cached_property
     def hash(self) -> str:
-        """16 hex digits that identify the run: the resolved scenario without its title, and what is in its packing file."""
+        """16 hex digits that identify the run: the resolved scenario without its title, and what is in the files that it names."""
         import tomli_w
 
         content = {k: v for k, v in self.to_dict().items() if k != "title"}
         digest = hashlib.sha256(tomli_w.dumps(content).encode())
-        if self.packing.file:
-            digest.update((self._folder / self.packing.file).read_bytes())
+        for name in files_named(content):
+            digest.update((self._folder / name).read_bytes())
         return digest.hexdigest()[:16]
 
     def __eq__(self, other: object) -> bool:
@@ -127,6 +127,20 @@ class Scenario(Table):
 
     def __hash__(self) -> int:
         return hash(self.hash)
+
+
+def files_named(raw: Mapping[str, Any]) -> list[str]:
+    """Paths of the files that a scenario's TOML data name: grains and records, as far as they are well-formed; each once."""
+
+    def table(value: Any) -> Mapping[str, Any]:
+        return value if isinstance(value, Mapping) else {}
+
+    named = [table(raw.get("packing")).get("file")]
+    stages = raw.get("stage")
+    for stage in stages if isinstance(stages, list) else []:
+        record = table(stage).get("record")
+        named += [record, table(record).get("file"), table(table(record).get("second")).get("file")]
+    return list(dict.fromkeys(name for name in named if isinstance(name, str)))
 
 
 def _count(grains: Grains) -> int:

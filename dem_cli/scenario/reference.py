@@ -126,7 +126,9 @@ def _depth(kind: Any) -> int:
 
 
 def _short(table: type[Table]) -> str:
-    usual = "length" if (table.short_form or {}).get("type") == "string" else "number"
+    """What the short form of a table is; of texts, those with a least length are names, and the others quantities."""
+    form = table.short_form or {}
+    usual = ("text" if "minLength" in form else "length") if form.get("type") == "string" else "number"
     return table.short_words or usual
 
 

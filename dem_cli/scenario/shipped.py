@@ -9,17 +9,19 @@ from pathlib import Path
 
 import dem_cli
 from dem_cli.errors import ScenarioError
+from dem_cli.scenario.model import files_named
 
 
 @dataclass(frozen=True)
 class Shipped:
-    """A scenario that comes along: its name, title, and what its comments say about it."""
+    """A scenario that comes along: its name, title, what its comments say about it, and the files that it reads, by name."""
 
     name: str
     title: str
     shows: str
     takes: str
     text: str
+    files: tuple[str, ...] = ()
 
 
 def folder() -> Path:
@@ -48,7 +50,9 @@ def shipped_scenario(name: str) -> Shipped:
 
 def _read(path: Path) -> Shipped:
     text = path.read_text(encoding="utf-8")
-    return Shipped(path.stem, tomllib.loads(text)["title"], _comment(text, "Shows"), _comment(text, "Takes"), text)
+    raw = tomllib.loads(text)
+    files = tuple(files_named(raw))
+    return Shipped(path.stem, raw["title"], _comment(text, "Shows"), _comment(text, "Takes"), text, files)
 
 
 def _comment(text: str, word: str) -> str:

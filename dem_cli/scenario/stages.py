@@ -3,11 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
-from dem_cli.scenario.quantities import Acceleration, Angle, Duration, DurationOrZero, Frequency, Number, Rate
+from dem_cli.scenario.ground_motion import GroundMotion, ground_motion
+from dem_cli.scenario.quantities import (
+    Acceleration,
+    Angle,
+    Duration,
+    DurationOrZero,
+    Frequency,
+    JsonSchema,
+    Number,
+    Rate,
+)
+from dem_cli.scenario.records import Record
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
 
@@ -43,29 +55,62 @@ class Settle(Table):
 
 
 class Shake(Table):
-    """Shakes the container by a sine: ground acceleration amplitude * sin(2 pi frequency t), begun at rest."""
+    """Shakes the container: by a sine, ground acceleration amplitude * sin(2 pi frequency t), or by a recorded motion."""
 
     kind: Literal["shake"] = key(doc='"shake"', example="shake")
     name: str = key("shake", "name in reports", example="400 gal")
-    amplitude: Acceleration = key(doc="amplitude of the ground's acceleration", example="400 gal")
-    frequency: Frequency = key(doc="frequency of the sine", example="10 Hz")
-    duration: Duration | None = key(None, "how long; or give cycles", example="5 s")
+    amplitude: Acceleration | None = key(
+        None, "sine: amplitude of the ground's acceleration; or give record", example="400 gal"
+    )
+    frequency: Frequency | None = key(None, "sine: its frequency", example="10 Hz")
+    record: Record | None = key(
+        None,
+        "recorded motion, in place of amplitude and frequency: the file, or a table",
+        example={"file": "quake-ns.at2", "peak": "400 gal"},
+    )
+    duration: Duration | None = key(
+        None,
+        "how long; or give cycles. With a record it may be left out; the record is cut, or followed by rest",
+        example="5 s",
+    )
     cycles: Annotated[float, Number(gt=0.0)] | None = key(
         None, "how many periods of the sine; or give duration", example=50
     )
     ramp: DurationOrZero = key(
         "0 s",
-        "time over which the amplitude grows from zero at the start, and falls to zero at the end",
+        "sine: time over which the amplitude grows from zero at the start, and falls to zero at the end",
         example="0.5 s",
     )
     angle: Angle = key("0 deg", "direction of the shaking, anticlockwise from +x (to the right)", example="0 deg")
 
-    alternatives: ClassVar = ((("duration",), ("cycles",)),)
+    alternatives: ClassVar = ((("amplitude", "frequency"), ("record",)), (("duration",), ("cycles",), ()))
+    more_schema: ClassVar[JsonSchema] = {
+        "if": {"required": ["record"]},
+        "then": {"not": {"anyOf": [{"required": [name]} for name in ("amplitude", "frequency", "cycles")]}},
+        "else": {"oneOf": [{"required": ["duration"]}, {"required": ["cycles"]}]},
+    }
+
+    # The motion of the record, once `read_record` has been called: paths start in the scenario's folder.
+    _motion: GroundMotion | None = PrivateAttr(default=None)
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
-        good = given.good
-        enough = {"frequency", "ramp", "duration", "cycles"} <= good.keys()
+        raw, good = given
+        if "record" in raw:
+            for name, remedy in (
+                ("cycles", "Write duration in its place"),
+                ("ramp", "Write taper in the record's table in its place"),
+            ):
+                if name in raw and good.get(name) and "amplitude" not in raw:
+                    yield Mistake((name,), "is of a sine, and contradicts record", remedy)
+            rest = 2.0 * good["record"].pad if good.get("record") else 0.0
+            if good.get("duration") and rest >= good["duration"]:
+                rule = f"leaves nothing of the stage, which takes {good['duration']:g} s"
+                yield Mistake(("record", "pad"), rule, "Shorten it, or give the stage more time")
+            return
+        if "duration" not in raw and "cycles" not in raw:
+            yield Mistake(("duration",), "is missing", "Give one of: duration or cycles")
+        enough = {"frequency", "ramp", "duration", "cycles"} <= good.keys() and good["frequency"]
         if enough and bool(good["duration"]) != bool(good["cycles"]):
             longest = good["duration"] or good["cycles"] / good["frequency"]
             if 2.0 * good["ramp"] > longest:
@@ -73,12 +118,27 @@ class Shake(Table):
                     ("ramp",), f"is longer than half of the stage, which takes {longest:g} s", "Shorten the ramp"
                 )
 
+    def read_record(self, folder: Path) -> None:
+        """Reads and prepares the recorded motion; its path starts in `folder`. RecordError if it cannot be used."""
+        if self.record is not None:
+            self._motion = ground_motion(self.record, self.duration, folder)
+
+    @property
+    def motion(self) -> GroundMotion | None:
+        """The recorded motion, None for a sine. ValueError if it has not been read."""
+        if self.record is not None and self._motion is None:
+            raise ValueError("the record of this stage has not been read: load the scenario, or call read_record")
+        return self._motion
+
     @property
     def longest(self) -> float:
         """Time that the stage takes [s]."""
         if self.duration is not None:
             return self.duration
+        if (motion := self.motion) is not None:
+            return motion.duration
         assert self.cycles is not None
+        assert self.frequency is not None
         return self.cycles / self.frequency
 
 

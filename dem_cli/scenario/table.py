@@ -68,8 +68,11 @@ class Table(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", validate_default=True, defer_build=True)
 
-    # Sets of keys that exclude each other; one set of each group must be there. An override of one displaces the others.
+    # Sets of keys that exclude each other; one set of each group must be there, unless the group holds an empty set, too. An
+    # override of one displaces the others.
     alternatives: ClassVar[tuple[tuple[tuple[str, ...], ...], ...]] = ()
+    # Rules between keys that JSON Schema can say, beside those of `alternatives`.
+    more_schema: ClassVar[JsonSchema] = {}
     # JSON Schema of the short form that `spell_out` understands.
     short_form: ClassVar[JsonSchema | None] = None
     # What the manual calls it, where its type does not say.
@@ -110,11 +113,11 @@ class Table(BaseModel):
         except ValidationError as error:
             found = [said for one in error.errors(include_url=False) if (said := _in_our_words(cls, one))]
             good = _good_values(cls, raw)
-        found = _without_echoes(found)
         for loc, rule, remedy in (*_alternatives(cls, raw), *cls.rules(Given(raw, good))):
             if rule == "is missing" and _at(raw, loc) is not NOTHING:
                 continue  # it is there but wrong, which is said already
             found.append(InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=_at(raw, loc)))
+        found = _without_echoes(found)
         if not isinstance(written, dict):  # a short form: what is wrong with it is said once, where it stands
             found = list({_said(one)[:2]: InitErrorDetails(type=one["type"], input=written) for one in found}.values())
         if found or table is None:
@@ -124,12 +127,20 @@ class Table(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
         plain = handler.resolve_ref_schema(handler(schema))
-        one_of = [{"oneOf": [{"required": list(option)} for option in group]} for group in cls.alternatives]
-        plain.update(one_of[0] if len(one_of) == 1 else {})
+        said = [_group_schema(group) for group in cls.alternatives] + ([cls.more_schema] if cls.more_schema else [])
+        plain.update(said[0] if len(said) == 1 else {"allOf": said} if said else {})
         if cls.short_form is None:
             return plain
         about = {k: plain.pop(k) for k in ("description", "title") if k in plain}
         return about | {"anyOf": [cls.short_form, plain]}
+
+
+def _group_schema(group: tuple[tuple[str, ...], ...]) -> JsonSchema:
+    """JSON Schema of one group of alternatives."""
+    options: list[JsonSchema] = [{"required": list(option)} for option in group if option]
+    if () not in group:
+        return {"oneOf": options}
+    return {"oneOf": [*options, {"not": {"anyOf": options}}]}
 
 
 def keys_of(table: type[Table]) -> list[str]:
@@ -156,8 +167,8 @@ def _at(raw: Any, loc: tuple[str | int, ...]) -> Any:
 def _alternatives(cls: type[Table], raw: Mapping[str, Any]) -> Iterator[Mistake]:
     for group in cls.alternatives:
         present = [options for options in group if any(k in raw for k in options)]
-        names = " or ".join(" + ".join(options) for options in group)
-        if not present:
+        names = " or ".join(" + ".join(options) for options in group if options)
+        if not present and () not in group:
             yield Mistake((group[0][0],), "is missing", f"Give one of: {names}")
         for options in present[1:]:
             other = next(k for k in present[0] if k in raw)

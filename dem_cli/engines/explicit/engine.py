@@ -11,7 +11,7 @@ import numpy as np
 from dem_cli.assembly import Assembly
 from dem_cli.engines.explicit.checks import Watch, blown_up
 from dem_cli.engines.explicit.lists import FINE
-from dem_cli.engines.explicit.motion import Ground, SineShaking, Still, gravity_of
+from dem_cli.engines.explicit.motion import Ground, gravity_of, ground_of
 from dem_cli.engines.explicit.schedule import Schedule
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.engines.explicit.timestep import choose_time_step
@@ -44,7 +44,7 @@ class ExplicitEngine:
         for number, stage in enumerate(self.scenario.stages):
             self.stage = number
             self.stage_started = self.state.time
-            ground: Ground = SineShaking.of(stage) if isinstance(stage, Shake) else Still()
+            ground = ground_of(stage)
             damping = (stage.damping.mass, stage.damping.local) if isinstance(stage, Settle) else (0.0, 0.0)
             yield from self._run_stage(stage, ground, damping)
             self._ground_place = self._ground_place + ground.motion(stage.longest)[0]
