@@ -13,6 +13,7 @@ import pytest
 from results_samples import (
     PAIRS,
     N,
+    as_format_1,
     box,
     coordination,
     no_walls,
@@ -135,26 +136,6 @@ def test_a_cut_off_run_keeps_its_bonds(tmp_path: Path) -> None:
 
 
 # ------------------------------------------------------------------------------------------- old files
-
-
-def as_format_1(path: Path) -> None:
-    """Take away what format 1 did not have."""
-    with h5py.File(path, "a") as file:
-        file.attrs["format_version"] = 1
-        del file.attrs["elements"]
-        for name in ("body", "a", "b"):
-            del file["VTKHDF/PointData"][name]
-            del file["VTKHDF/Steps/PointDataOffsets"][name]
-        del file["frames/bond_energy"]
-        for name in ("bond_energy", "bond_gap", "bond_slip", "bond_roll"):
-            del file["series"][name]
-        group = file["stages"]
-        keep = ~np.char.startswith(group["quantity"].asstr()[:].astype(str), "bond_")
-        for name in ("quantity", "units", "before", "after"):
-            values = group[name][:]
-            del group[name]
-            shorter = values[keep] if values.ndim == 1 else values[:, keep]
-            group.create_dataset(name, data=shorter, dtype=values.dtype)
 
 
 def test_a_file_of_format_1_opens(tmp_path: Path) -> None:
