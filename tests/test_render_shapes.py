@@ -129,6 +129,9 @@ def test_mean_of_a_body_leaves_single_elements_alone() -> None:
     grains = replace(grains, mass=np.array([1.0, 3.0, 1.0, 1.0]), body=np.array([0, 0, 1, 2]))
     values = np.array([1.0, 2.0, 0.1, 0.3])
     assert bodies.of_bodies(grains, values).tolist() == [1.75, 1.75, 0.1, 0.3]
+    rng = np.random.default_rng(1)
+    alone = Grains.discs(rng.random(500), rng.random(500), rng.random(500), DENSITY, DEPTH)
+    assert np.array_equal(bodies.of_bodies(alone, alone.x), alone.x)
 
 
 numbers = st.floats(-1.0, 1.0)

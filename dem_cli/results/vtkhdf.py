@@ -165,7 +165,7 @@ class FrameWriter:
     def size(self, frame: Frame) -> int:
         """Bytes that a frame takes, to within a few percent."""
         elements = (87 if self._turning else 71) * self._n
-        return elements + 90 * (0 if frame.contacts is None else len(frame.contacts)) + 56 * len(self._bonds)
+        return elements + 90 * (0 if frame.contacts is None else len(frame.contacts)) + 43 * len(self._bonds)
 
     def append(self, frame: Frame, coordination: Ints, stress: Floats) -> int:
         """Hand one frame to HDF5. coordination (n,), stress (n, 4) [Pa]: xx, xy, yx, yy. Returns its bytes."""
