@@ -292,6 +292,16 @@ def test_bonds_are_drawn_where_grains_are_large_enough(bonded: Results, monkeypa
     assert len(strokes_of(drawn(bonded, bonds=True), "bonds")) == 1
 
 
+def test_bars_of_a_clump_meet_at_its_centre(clump: Results, ellipse: Results) -> None:
+    g = clump.frame(-1).grains
+    (bars,) = strokes_of(drawn(clump), "bonds")
+    places = np.stack([g.x, g.y], axis=1) / 0.01
+    np.testing.assert_allclose(
+        ends_of(bars), sorted_ends(places, np.repeat(places.reshape(-1, 3, 2).mean(axis=1), 3, axis=0))
+    )
+    assert strokes_of(drawn(ellipse, bonds=True), "bonds") == []
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 def test_marks_show_how_elements_are_turned(folder: Path, shape: str) -> None:
     with open_results(folder / f"{shape}.h5") as results:

@@ -37,7 +37,7 @@ import click
 @click.option(
     "--bonds/--no-bonds",
     default=None,
-    help="Sample: bars between bonded discs [default: if grains are large enough].",
+    help="Sample: bars that join the discs of a grain [default: if grains are large enough].",
 )
 @click.option("--marks", is_flag=True, help="Sample: a radius of each disc, half the long axis of each ellipse.")
 @click.option(

@@ -47,7 +47,10 @@ def draw_rose(results: Results, index: int) -> Figure:
     ax.plot(theta, fitted, color="black", lw=1.0)
     for angle, length in ((large, fitted.max()), (large + 0.5 * np.pi, fitted.min())):
         ax.plot([angle, angle + np.pi], [length, length], color=COLORS[1], lw=1.2, ls=(0, (4, 2)))
-    ax.set_rmax(1.08 * max(float(density.max()), float(fitted.max())))
+    top = 1.08 * max(float(density.max()), float(fitted.max()))
+    ax.set_rmax(top)
+    step = max(0.5, round(top / 4.0))
+    ax.set_yticks(np.arange(step, top, step).tolist())
     ax.set_rlabel_position(22.5)
     text = f"t = {frame.time:.6g} s"
     if 0 <= frame.stage < len(results.stages):

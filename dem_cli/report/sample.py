@@ -62,7 +62,7 @@ def draw_sample(
     rad).
 
     Displacement and rotation count from the first frame of the frame's stage. Escaped grains are left out. chains, bonds: lines as wide
-    as the normal force, bars between bonded elements; None: where grains are large enough. marks: a radius or half axis of
+    as the normal force, bars between elements of a grain; None: where grains are large enough. marks: a radius or half axis of
     each element.
     """
     frame = results.frame(index)

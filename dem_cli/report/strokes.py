@@ -90,13 +90,18 @@ def _curves(low: Floats, high: Floats) -> Floats:
 
 
 def draw_bonds(ax: Axes, grains: Grains, bonds: Bonds, shown: Bools, factor: float, radius: float) -> None:
-    """Bars between the centres of bonded elements, a fifth of the mean radius (`radius`, points) wide."""
-    keep = shown[bonds.i] & shown[bonds.j]
-    i, j = bonds.i[keep], bonds.j[keep]
-    if len(i) == 0:
-        return
-    ends = [np.column_stack([grains.x[k], grains.y[k]]) for k in (i, j)]
-    draw_lines(ax, np.stack(ends, axis=1) / factor, np.full(len(i), min(0.2 * radius, 3.0)), BOND, "bonds")
+    """Bars that join the elements of a grain, a fifth of the mean radius (`radius`, points) wide: between the centres of bonded elements;
+    of a rigid clump, from each centre to the centre of mass.
+    """
+    i, j = bonds.i, bonds.j
+    start, end = (np.column_stack([grains.x[k], grains.y[k]]) for k in (i, j))
+    if len(bonds) == 0:
+        i = j = bodies.several(grains)
+        start, end = (np.column_stack([x[i], y[i]]) for x, y in ((grains.x, grains.y), bodies.centers(grains)))
+    keep = shown[i] & shown[j]
+    if keep.any():
+        width = np.full(np.count_nonzero(keep), min(0.2 * radius, 3.0))
+        draw_lines(ax, np.stack([start, end], axis=1)[keep] / factor, width, BOND, "bonds")
 
 
 def draw_marks(ax: Axes, grains: Grains, factor: float, radius: float) -> None:
