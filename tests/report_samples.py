@@ -9,7 +9,7 @@ import numpy as np
 
 from dem_cli.results import ResultWriter, partial_path
 from dem_cli.results.schema import SERIES
-from dem_cli.state import Contacts, Energy, Floats, Frame, Grains, Walls
+from dem_cli.state import Bonds, BondStrain, Contacts, Energy, Floats, Frame, Grains, Walls
 
 RADIUS = 0.007
 DRIVING = 0.1  # period of shaking [s]
@@ -22,6 +22,9 @@ DEPTHS = (0.5, 0.40, 0.39)
 RESOLVED = """
 title = "{title}"
 engine = "explicit"
+[grains]
+shape = "{shape}"
+density = "2480 kg/m^3"
 [container]
 width = "{width} m"
 gravity = "9.80665 m/s^2"
@@ -34,6 +37,9 @@ amplitude = "4.0 m/s^2"
 frequency = "10.0 Hz"
 duration = "4.0 s"
 """
+
+# shape, elements, walls, contacts, width [m], bonds
+Sample = tuple[str, Grains, Walls, Contacts, float, Bonds]
 
 
 def grid(columns: int, rows: int) -> tuple[Grains, Walls, Contacts, float]:
@@ -98,7 +104,7 @@ def series_row(time: float, step: int, stage: int, residual: float = 0.0) -> dic
     row.update(work=20.0 * later, energy_in=fall + 20.0 * later, residual=residual * share, damping=0.0)
     row.update(time_step_energy=0.01 * share, escaped_energy=0.0)
     lost = 300.0 - row["potential"] - row["kinetic"] - 2.5 * share + row["work"] + 0.01 * share - row["residual"]
-    row.update(friction=0.5 * lost, dashpot_normal=0.4 * lost, dashpot_tangential=0.1 * lost)
+    row.update(friction=0.5 * lost, dashpot_normal=0.4 * lost, dashpot_tangential=0.1 * lost, bond_energy=0.0)
     return row
 
 
@@ -114,12 +120,18 @@ def make_file(
     frames: int = 6,
     interval: float = 0.01,
     double_row: bool = False,
+    sample: Sample | None = None,
+    strain: tuple[float, float, float] = (1e-6, 2e-6, 3e-4),
 ) -> Path:
     """Two stages, settle (to 1 s) and shake (to 5 s); `stop_after` [s] cuts the run off there.
 
-    double_row: the row between the stages is written once for each.
+    double_row: the row between the stages is written once for each. sample: in place of discs on a grid. strain: largest gap [m],
+    slip [m] and roll [rad] of its bonds, reached in the last row.
     """
+    shape, bonds = "disc", Bonds.none()
     grains, walls, contacts, width = grid(columns, rows)
+    if sample is not None:
+        shape, grains, walls, contacts, width, bonds = sample
     n = len(grains)
     places = (np.arange(40) + 0.5) / 40 * width
     complete = stop_after == np.inf
@@ -127,13 +139,14 @@ def make_file(
     with ResultWriter(
         path,
         scenario_text="",
-        resolved_toml=RESOLVED.format(title=title.replace('"', ""), width=width),
+        resolved_toml=RESOLVED.format(title=title.replace('"', ""), width=width, shape=shape),
         scenario_hash="0123456789abcdef",
         seed=7,
         engine="explicit",
         title=title,
         grains=grains,
         walls=walls,
+        bonds=bonds,
         depth=1.0,
         container={"width": width, "height": None},
         tracks=None if tracks is None else np.array(tracks),
@@ -145,6 +158,9 @@ def make_file(
             if time > stop_after:
                 break
             row = series_row(float(time), 1000 * step, stage, residual)
+            row.update(
+                zip(("bond_gap", "bond_slip", "bond_roll"), (time / END * value for value in strain), strict=True)
+            )
             if time == 0.0:
                 writer.begin_stage("settle", "settle", 0.0, row)
             eta = row["depth"] + row["mode1"] * np.cos(np.pi * places / width) + 0.003 * np.sin(5.0 * places / width)
@@ -162,7 +178,7 @@ def make_file(
                 frame = Frame(
                     step=1000 * step, time=float(time), dt=1e-5, stage=stage, grains=moved, ground=np.zeros((3, 2)),
                     energy=Energy(), residual=0.0, energy_in=1.0, due=frozenset({"frames"}),
-                    contacts=contacts, forces=np.zeros((n, 2)),
+                    contacts=contacts, forces=np.zeros((n, 2)), bonds=_strain(bonds, strain, float(time)),
                 )  # fmt: skip
                 writer.append_frame(frame, np.arange(n) % 7, _stress(n))
             if time == times[-1]:
@@ -172,20 +188,30 @@ def make_file(
     return path if complete else partial_path(path)
 
 
+def _strain(bonds: Bonds, largest: tuple[float, float, float], time: float) -> BondStrain | None:
+    """Evenly spread over the bonds, from 0 to the largest."""
+    share = np.linspace(0.0, time / END, len(bonds))
+    return BondStrain(*(value * share for value in largest)) if len(bonds) else None
+
+
 def _moved(grains: Grains, time: float) -> Grains:
-    """Grains fall until 1 s, then go round on circles that grow with height, and turn."""
+    """Grains fall until 1 s, then go round on circles that grow with height, and turn, each as a rigid body."""
     lift = 0.3 * max(SETTLED - time, 0.0) ** 2
     t = max(time - SETTLED, 0.0)
-    size = 0.02 * grains.y
+    number, count = grains.body, np.bincount(grains.body)
+    middle_x, middle_y = (np.bincount(number, place)[number] / count[number] for place in (grains.x, grains.y))
+    size = 0.02 * middle_y
     phase = 2.0 * np.pi * t / SLOSH
+    turn = 0.2 * t * np.cos(number * 1.0) + (0.05 * number if len(count) == len(grains) else 0.0)
+    dx, dy, c, s = grains.x - middle_x, grains.y - middle_y, np.cos(turn), np.sin(turn)
     return replace(
         grains,
-        x=grains.x + size * np.sin(phase) + 0.3 * size * t,
-        y=grains.y * (1.0 + lift) + size * (np.cos(phase) - 1.0) - 0.01 * t * grains.y,
-        angle=0.2 * t * np.cos(grains.id * 1.0) + 0.05 * grains.id,
+        x=middle_x + c * dx - s * dy + size * np.sin(phase) + 0.3 * size * t,
+        y=middle_y * (1.0 + lift) + s * dx + c * dy + size * (np.cos(phase) - 1.0) - 0.01 * t * middle_y,
+        angle=grains.angle + turn,
         vx=size * 2.0 * np.pi / SLOSH * np.cos(phase),
         vy=np.full(len(grains), -0.6 * max(SETTLED - time, 0.0)),
-        spin=0.2 * np.cos(grains.id * 1.0),
+        spin=0.2 * np.cos(number * 1.0),
     )
 
 

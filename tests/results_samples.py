@@ -6,6 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from dem_cli.results import ResultWriter
@@ -128,3 +129,23 @@ def same_arrays(a: Any, b: Any) -> bool:
         getattr(a, f.name).dtype == getattr(b, f.name).dtype and np.array_equal(getattr(a, f.name), getattr(b, f.name))
         for f in fields(a)
     )
+
+
+def as_format_1(path: Path) -> None:
+    """Take away what format 1 did not have."""
+    with h5py.File(path, "a") as file:
+        file.attrs["format_version"] = 1
+        del file.attrs["elements"]
+        for name in ("body", "a", "b"):
+            del file["VTKHDF/PointData"][name]
+            del file["VTKHDF/Steps/PointDataOffsets"][name]
+        del file["frames/bond_energy"]
+        for name in ("bond_energy", "bond_gap", "bond_slip", "bond_roll"):
+            del file["series"][name]
+        group = file["stages"]
+        keep = ~np.char.startswith(group["quantity"].asstr()[:].astype(str), "bond_")
+        for name in ("quantity", "units", "before", "after"):
+            values = group[name][:]
+            del group[name]
+            shorter = values[keep] if values.ndim == 1 else values[:, keep]
+            group.create_dataset(name, data=shorter, dtype=values.dtype)

@@ -54,6 +54,15 @@ def test_series_imply_their_kind(path: Path) -> None:
     assert result.stdout.endswith("run-series.png\n")
 
 
+def test_what_is_drawn_over_the_grains_is_asked_for(path: Path) -> None:
+    pictures = []
+    for k, options in enumerate(([], ["--marks"], ["--no-chains"])):
+        assert call(path, "-o", path.with_name(f"{k}.png"), "--dpi", 40, *options).exit_code == 0
+        pictures.append(path.with_name(f"{k}.png").read_bytes())
+    assert len(set(pictures)) == 3
+    assert call(path, "--what", "rose", "--frame", 0, "--dpi", 40).stdout.endswith("run-rose.png\n")
+
+
 def test_nearest_frame_is_told(path: Path) -> None:
     assert "nearest frame: t = 2 s" in call(path, "--time", 2.2, "--dpi", 40).stderr
     assert call(path, "--time", 2.0, "--dpi", 40, "--force").stderr == ""
@@ -83,6 +92,10 @@ def test_incomplete_run_is_told(tmp_path: Path) -> None:
         ["--time", "9"],
         ["--time", "1", "--frame", "1"],
         ["--time", "1", "--what", "surface"],
+        ["--marks", "--what", "rose"],
+        ["--no-bonds", "--what", "energy"],
+        ["--no-chains", "--what", "rose"],
+        ["--color", "radius", "--what", "rose"],
         ["--frame", "99"],
         ["--stage", "7"],
         ["-o", "picture.bmp"],

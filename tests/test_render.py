@@ -16,7 +16,7 @@ from matplotlib.image import imread
 from matplotlib.transforms import Affine2D
 
 from dem_cli.errors import DemError, ResultsError, ScenarioError
-from dem_cli.report import sample
+from dem_cli.report import sample, strokes
 from dem_cli.report.figures import KINDS, Picture, choose_frame, choose_window, draw
 from dem_cli.report.look import axis_label, check_target, display_unit, extension, save, style
 from dem_cli.report.sample import QUANTITIES, first_frame_of_stage
@@ -162,7 +162,7 @@ def test_values_of_the_quantities(results: Results) -> None:
         "stress_yy": s[:, 3],
         "stress_xy": (s[:, 1] + s[:, 2]) / 2,
     }
-    assert set(want) == set(QUANTITIES)
+    assert set(want) | {"body", "aspect", "orientation"} == set(QUANTITIES)  # those: tests/test_render_shapes.py
     for name, values in want.items():
         figure = drawn(results, color=name, chains=False)
         (discs,) = collections(figure, EllipseCollection)
@@ -202,7 +202,7 @@ def test_chains_join_the_centres_as_wide_as_the_force(results: Results, monkeypa
     frame = results.frame(-1)
     c = frame.contacts
     assert c is not None
-    monkeypatch.setattr(sample, "MOST_PATHS", 10**6)  # a path for each contact
+    monkeypatch.setattr(strokes, "MOST_PATHS", 10**6)  # a path for each contact
     figure = drawn(results, chains=True)
     _, lines = collections(figure, PathCollection)
     widest = np.percentile(c.normal, 99.5)
@@ -226,7 +226,7 @@ def test_chains_join_the_centres_as_wide_as_the_force(results: Results, monkeypa
 
 def test_paths_are_gathered_but_none_is_lost(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
     single = collections(drawn(results, chains=True), PathCollection)[1]
-    monkeypatch.setattr(sample, "MOST_PATHS", 7)
+    monkeypatch.setattr(strokes, "MOST_PATHS", 7)
     figure = drawn(results, chains=True)
     lines = collections(figure, PathCollection)[1]
     assert len(lines.get_paths()) <= 7

@@ -15,8 +15,9 @@ import report_samples as made
 
 from dem_cli.analysis.sloshing import theory_period, thesis_period
 from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.report.cautions import RESIDUAL_LIMIT
 from dem_cli.report.export import export_csv, folders
-from dem_cli.report.summary import LOST, MEASURES, RESIDUAL_LIMIT, STORED, Summary, summary
+from dem_cli.report.summary import LOST, MEASURES, STORED, Summary, summary
 from dem_cli.report.text import Block, blocks, comparison, plain, show
 from dem_cli.results import Results, open_results
 

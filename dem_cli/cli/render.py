@@ -20,18 +20,26 @@ import click
 @click.option(
     "--what",
     metavar="KIND",
-    help="sample, histories, trajectories, surface, energy, motion or series [default: sample].",
+    help="sample, rose, histories, trajectories, surface, energy, motion or series [default: sample].",
 )
-@click.option("--time", type=float, metavar="T", help="Sample: the frame nearest to T seconds.")
-@click.option("--frame", type=int, metavar="K", help="Sample: frame K from 0, or -1, -2, ... from the last.")
-@click.option("--last", is_flag=True, help="Sample: the last frame (the default).")
-@click.option("--stage", type=int, metavar="N", help="Only stage N, from 1 (0: whole run); sample: its last frame.")
+@click.option("--time", type=float, metavar="T", help="Sample, rose: the frame nearest to T seconds.")
+@click.option("--frame", type=int, metavar="K", help="Sample, rose: frame K from 0, or -1, -2, ... from the last.")
+@click.option("--last", is_flag=True, help="Sample, rose: the last frame (the default).")
+@click.option(
+    "--stage", type=int, metavar="N", help="Only stage N, from 1 (0: whole run); sample, rose: its last frame."
+)
 @click.option("--color", metavar="QUANTITY", help="Sample: what grains are coloured by [default: displacement].")
 @click.option(
     "--chains/--no-chains",
     default=None,
     help="Sample: lines as wide as the normal force [default: if grains are large enough].",
 )
+@click.option(
+    "--bonds/--no-bonds",
+    default=None,
+    help="Sample: bars that join the discs of a grain [default: if grains are large enough].",
+)
+@click.option("--marks", is_flag=True, help="Sample: a radius of each disc, half the long axis of each ellipse.")
 @click.option(
     "--range",
     "limits",
@@ -52,6 +60,8 @@ def command(
     stage: int | None,
     color: str | None,
     chains: bool | None,
+    bonds: bool | None,
+    marks: bool,
     limits: str | None,
     series: str | None,
     grains: str | None,
@@ -62,6 +72,7 @@ def command(
 
     \b
     sample        grains to scale, coloured by a quantity, with force chains
+    rose          directions of the contacts between grains, and their fabric
     histories     displacement x, y and rotation of tracked grains
     trajectories  ways of tracked grains
     surface       free surface over place and time, and its antisymmetric mode
@@ -69,9 +80,11 @@ def command(
     motion        acceleration, velocity and displacement of the container
     series        any quantity of /series over time
 
-    QUANTITY is radius, id, speed, spin, displacement, displacement_x, displacement_y, rotation, coordination,
-    pressure, shear_stress, stress_xx, stress_yy or stress_xy; displacement and rotation count from the start
-    of the frame's stage. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
+    QUANTITY is radius, id, body, aspect, orientation, speed, spin, displacement, displacement_x,
+    displacement_y, rotation, coordination, pressure, shear_stress, stress_xx, stress_yy or stress_xy;
+    displacement and rotation count from the start of the frame's stage. Grains of several discs have one
+    displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only tells
+    grains apart. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.
@@ -89,6 +102,8 @@ def command(
         stage=stage,
         color=color or "displacement",
         chains=chains,
+        bonds=bonds,
+        marks=marks,
         limits=_pair(limits) if limits else None,
         series=[name.strip() for name in series.split(",")] if series else DEFAULT_SERIES,
         grains=_whole(grains) if grains else None,
@@ -98,6 +113,9 @@ def command(
     given = {
         "--time/--frame/--last": moment,
         "--color": color,
+        "--chains/--no-chains": chains is not None,
+        "--bonds/--no-bonds": bonds is not None,
+        "--marks": marks,
         "--series": series,
         "--grains": grains,
         "--range": limits,
@@ -122,8 +140,11 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
     from dem_cli.errors import ScenarioError
 
     kinds = {
-        "--time/--frame/--last": ("sample",),
+        "--time/--frame/--last": ("sample", "rose"),
         "--color": ("sample",),
+        "--chains/--no-chains": ("sample",),
+        "--bonds/--no-bonds": ("sample",),
+        "--marks": ("sample",),
         "--series": ("series",),
         "--grains": ("histories", "trajectories"),
         "--range": ("sample", "surface"),

@@ -38,6 +38,7 @@ LOST = {
     "friction": ("lost to friction", "#8C510A"),
     "dashpot_normal": ("lost to normal dashpots", "#D8A04A"),
     "dashpot_tangential": ("lost to tangential dashpots", "#F6E0B5"),
+    "bond_energy": ("lost to bonds", "#BF6F8F"),
     "damping": ("lost to extra damping", "#BDBDBD"),
     "escaped_energy": ("carried off by escaped grains", "#737373"),
 }
@@ -72,6 +73,8 @@ def draw_energy(results: Results, window: Window, text: str) -> Figure:
     inside = _inside(np.asarray(results.series["time"]), window)
 
     def column(name: str) -> Floats:
+        if name not in results.series:  # a file from before there were bonds
+            return np.zeros(np.count_nonzero(inside))
         return np.nan_to_num(np.asarray(results.series[name])[inside])
 
     time = column("time")

@@ -16,7 +16,7 @@ from dem_cli.results import Results
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = ("sample", "histories", "trajectories", "surface", "energy", "motion", "series")
+KINDS = ("sample", "rose", "histories", "trajectories", "surface", "energy", "motion", "series")
 DEFAULT_SERIES = ("void_ratio", "depth", "coordination", "kinetic")
 
 
@@ -25,7 +25,7 @@ class Picture:
     """What to draw. All quantities SI; None picks the default described in `dem render --help`.
 
     time [s], frame (0-based, negative from the end), stage (1-based, 0 is the whole run), color: a quantity
-    of a grain, limits of the colours, series: names, grains: numbers of tracked grains.
+    of a grain, chains, bonds, marks: what is drawn over the grains, limits of the colours, series: names, grains: numbers of tracked grains.
     """
 
     what: str = "sample"
@@ -34,6 +34,8 @@ class Picture:
     stage: int | None = None
     color: str = "displacement"
     chains: bool | None = None
+    bonds: bool | None = None
+    marks: bool = False
     limits: tuple[float, float] | None = None
     series: Sequence[str] = DEFAULT_SERIES
     grains: Sequence[int] | None = None
@@ -44,7 +46,7 @@ def draw(results: Results, picture: Picture) -> Figure:
     `look.style()`.
     """
     # Imported here so that one kind of picture does not load what only another needs.
-    from dem_cli.report import curves, motions, sample, tracked
+    from dem_cli.report import curves, motions, rose, sample, tracked
 
     check_request(picture)
     _check_file(results, picture)
@@ -54,8 +56,12 @@ def draw(results: Results, picture: Picture) -> Figure:
             choose_frame(results, picture),
             color=picture.color,
             chains=picture.chains,
+            bonds=picture.bonds,
+            marks=picture.marks,
             limits=picture.limits,
         )
+    if picture.what == "rose":
+        return rose.draw_rose(results, choose_frame(results, picture))
     window, text = choose_window(results, picture)
     if picture.what == "histories":
         return tracked.draw_histories(results, tracked.paths(results, window, picture.grains), text)
@@ -129,7 +135,7 @@ def check_request(picture: Picture) -> None:
     """Raise ScenarioError for what no file could give: an unknown kind of picture or quantity, colour limits
     upside down.
     """
-    from dem_cli.report.sample import QUANTITIES
+    from dem_cli.report.quantities import QUANTITIES
 
     if picture.what not in KINDS:
         raise ScenarioError(unknown("kind of picture", picture.what, KINDS))

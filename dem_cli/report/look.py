@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 SEQUENTIAL = "cividis"
 DIVERGING = "PuOr"
+CYCLIC = "twilight"
 
 Extend = Literal["neither", "min", "max", "both"]
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dem_cli.report import bodies
 from dem_cli.report.look import (
+    CYCLIC,
     DIVERGING,
     SEQUENTIAL,
     Extend,
@@ -20,70 +20,32 @@ from dem_cli.report.look import (
     new_figure,
     stage_label,
 )
+from dem_cli.report.quantities import QUANTITIES, Quantity
+from dem_cli.report.strokes import (
+    EDGE,
+    EDGE_WIDTH,
+    RASTER_ABOVE,
+    draw_bonds,
+    draw_lines,
+    draw_marks,
+    draw_outlines,
+)
 from dem_cli.results import Results, StoredFrame
 from dem_cli.state import Bools, Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import EllipseCollection
-    from matplotlib.colors import Normalize
+    from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
 
-# Above this number vector pictures hold the grains and chains as an image: a million paths open in no viewer.
-RASTER_ABOVE = 20_000
-MOST_PATHS = 4_000
+# Most grains that are drawn with an edge.
+MOST_EDGES = 5000
+# Colours of numbers that only tell grains apart.
+PALETTE = ("#8DD3C7", "#FDDC8C", "#BEBADA", "#FB9A8B", "#80B1D3", "#FDB462", "#B3DE69")
+# Of a grain without a value: a colour that the map has not.
+UNDEFINED = {"cyclic": "0.65"}
 # Mean radius [points] below which a grain is too small to be told from the line through it.
 SMALL_RADIUS = 1.5
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What grains can be coloured by: label, SI unit, values(frame, frame at the start of its stage) -> (n,).
-
-    kind: "range" from smallest to largest, "from-zero", "signed" (symmetric about zero) or "count" (whole
-    numbers).
-    """
-
-    label: str
-    unit: str
-    kind: str
-    values: Callable[[StoredFrame, StoredFrame], Floats]
-    since: bool = False
-
-
-def _shear_stress(frame: StoredFrame, _: StoredFrame) -> Floats:
-    xx, xy, yx, yy = frame.stress.T
-    return np.asarray(np.hypot(0.5 * (xx - yy), 0.5 * (xy + yx)))
-
-
-QUANTITIES: dict[str, Quantity] = {
-    "radius": Quantity("radius", "m", "range", lambda f, _: f.grains.radius),
-    "id": Quantity("number of the grain", "1", "range", lambda f, _: f.grains.id.astype(float)),
-    "speed": Quantity("speed", "m/s", "from-zero", lambda f, _: np.hypot(f.grains.vx, f.grains.vy)),
-    "spin": Quantity("angular velocity, anticlockwise", "rad/s", "signed", lambda f, _: f.grains.spin),
-    "displacement": Quantity(
-        "displacement",
-        "m",
-        "from-zero",
-        lambda f, s: np.hypot(f.grains.x - s.grains.x, f.grains.y - s.grains.y),
-        True,
-    ),
-    "displacement_x": Quantity("displacement in x", "m", "signed", lambda f, s: f.grains.x - s.grains.x, True),
-    "displacement_y": Quantity("displacement in y", "m", "signed", lambda f, s: f.grains.y - s.grains.y, True),
-    "rotation": Quantity(
-        "rotation, anticlockwise", "rad", "signed", lambda f, s: f.grains.angle - s.grains.angle, True
-    ),
-    "coordination": Quantity("contacts of the grain", "1", "count", lambda f, _: f.coordination.astype(float)),
-    "pressure": Quantity(
-        "mean stress in the grain", "Pa", "from-zero", lambda f, _: 0.5 * (f.stress[:, 0] + f.stress[:, 3])
-    ),
-    "shear_stress": Quantity("largest shear stress in the grain", "Pa", "from-zero", _shear_stress),
-    "stress_xx": Quantity("stress xx in the grain", "Pa", "from-zero", lambda f, _: f.stress[:, 0]),
-    "stress_yy": Quantity("stress yy in the grain", "Pa", "from-zero", lambda f, _: f.stress[:, 3]),
-    "stress_xy": Quantity(
-        "stress xy in the grain", "Pa", "signed", lambda f, _: 0.5 * (f.stress[:, 1] + f.stress[:, 2])
-    ),
-}
 
 
 def draw_sample(
@@ -92,12 +54,16 @@ def draw_sample(
     *,
     color: str = "displacement",
     chains: bool | None = None,
+    bonds: bool | None = None,
+    marks: bool = False,
     limits: tuple[float, float] | None = None,
 ) -> Figure:
     """Frame `index`, grains coloured by QUANTITIES[color]; `limits` of the colours in SI units (rotation:
     rad).
 
-    Displacement and rotation count from the first frame of the frame's stage. Escaped grains are left out.
+    Displacement and rotation count from the first frame of the frame's stage. Escaped grains are left out. chains, bonds: lines as wide
+    as the normal force, bars between elements of a grain; None: where grains are large enough. marks: a radius or half axis of
+    each element.
     """
     frame = results.frame(index)
     quantity = QUANTITIES[color]
@@ -120,9 +86,14 @@ def draw_sample(
     ax.set_ylabel(axis_label("y", unit))
     _draw_grains(ax, frame, shown, values, quantity, factor, limits)
     points = _points_per_meter(box)
+    radius = float(np.mean(frame.grains.radius)) * points
+    if bonds or (bonds is None and radius >= SMALL_RADIUS):
+        draw_bonds(ax, frame.grains, results.bonds, shown, factor, radius)
     if chains is None:
-        chains = float(np.mean(frame.grains.radius)) * points >= SMALL_RADIUS
+        chains = radius >= SMALL_RADIUS
     caption = _draw_chains(ax, frame, factor, points) if chains else ""
+    if marks:
+        draw_marks(ax, frame.grains.take(shown), factor, radius)
     _draw_walls(ax, frame, box, factor)
     text = f"t = {frame.time:.6g} s"
     if 0 <= frame.stage < len(results.stages):
@@ -145,10 +116,11 @@ def _view(results: Results, frame: StoredFrame, shown: Bools) -> tuple[float, fl
     near.
     """
     g = frame.grains
-    right = max(results.width, float(np.max((g.x + g.radius)[shown], initial=0.0)))
-    left = min(0.0, float(np.min((g.x - g.radius)[shown], initial=0.0)))
-    top = float(np.max((g.y + g.radius)[shown], initial=0.0))
-    bottom = min(0.0, float(np.min((g.y - g.radius)[shown], initial=0.0)))
+    wide, high = bodies.reach(g)
+    right = max(results.width, float(np.max((g.x + wide)[shown], initial=0.0)))
+    left = min(0.0, float(np.min((g.x - wide)[shown], initial=0.0)))
+    top = float(np.max((g.y + high)[shown], initial=0.0))
+    bottom = min(0.0, float(np.min((g.y - high)[shown], initial=0.0)))
     if results.height is not None and results.height < 1.5 * top:
         top = max(top, results.height)
     top = max(top, 0.1 * results.width)
@@ -181,44 +153,59 @@ def _draw_grains(
 
     grains = frame.grains.take(shown)
     finite = values[np.isfinite(values)]
+    if quantity.kind == "label":
+        values = finite = values % len(PALETTE)
     scale, unit = display_unit(quantity.unit, largest(finite) if limits is None else largest(np.array(limits)))
     norm, cmap, extend = _colors(finite / scale, quantity.kind, None if limits is None else np.array(limits) / scale)
-    diameter = 2.0 * grains.radius / factor
-    discs: EllipseCollection = EllipseCollection(
-        diameter,
-        diameter,
-        np.zeros(len(grains)),
+    edges = grains.grain_count <= MOST_EDGES
+    widths = np.full(len(grains), EDGE_WIDTH if edges else 0.0)
+    widths[bodies.several(grains)] = 0.0
+    ellipses: EllipseCollection = EllipseCollection(
+        2.0 * grains.a / factor,
+        2.0 * grains.b / factor,
+        np.where(grains.a == grains.b, 0.0, np.degrees(grains.angle)),
         units="x",
         offsets=np.column_stack([grains.x, grains.y]) / factor,
         offset_transform=ax.transData,
         array=np.ma.masked_invalid(values / scale),
         cmap=cmap,
         norm=norm,
-        linewidths=0.25 if len(grains) <= 5000 else 0.0,
-        edgecolors="0.25" if len(grains) <= 5000 else "none",
+        linewidths=widths,
+        edgecolors=EDGE if edges else "none",
         rasterized=len(grains) > RASTER_ABOVE,
     )
-    ax.add_collection(discs)
-    bar = ax.figure.colorbar(discs, ax=ax, extend=extend, aspect=28, pad=0.02)
+    ax.add_collection(ellipses)
+    if edges:
+        draw_outlines(ax, grains, factor)
+    if quantity.kind == "label":
+        return
+    bar = ax.figure.colorbar(ellipses, ax=ax, extend=extend, aspect=28, pad=0.02)
     label = quantity.label + (" since the stage began" if quantity.since else "")
     bar.set_label(axis_label(label, unit))
     bar.outline.set_linewidth(0.5)
+    if quantity.kind == "cyclic":
+        bar.set_ticks([-90, -45, 0, 45, 90])
     if quantity.kind == "count":
         low, high = int(np.ceil(norm.vmin or 0.0)), int(np.floor(norm.vmax or 0.0))
         bar.set_ticks(list(range(low, high + 1, max(1, (high - low) // 8))))
 
 
-def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize, str, Extend]:
+def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize, Colormap, Extend]:
     """Norm, colour map and arrows of the colour bar. Long tails are cut at the 99.5th percentile, shown by an
     arrow.
     """
-    from matplotlib.colors import BoundaryNorm, Normalize
+    from matplotlib import colormaps
+    from matplotlib.colors import BoundaryNorm, ListedColormap, Normalize
 
+    if kind == "label":
+        return Normalize(-0.5, len(PALETTE) - 0.5), ListedColormap(PALETTE), "neither"
     if len(values) == 0:
         values = np.zeros(1)
     lowest, highest = float(values.min()), float(values.max())
     if limits is not None:
         low, high = float(limits[0]), float(limits[1])
+    elif kind == "cyclic":
+        low, high = -90.0, 90.0
     elif kind == "signed":
         high = float(np.percentile(np.abs(values), 99.5))
         low = -high
@@ -226,8 +213,11 @@ def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize
         low, high = 0.0, float(np.percentile(values, 99.5))
     else:
         low, high = lowest, highest
+        if high - low <= 1e-9 * abs(high):
+            low = high  # the same but for the last digits
     extend = extension(values, low, high)
-    cmap = DIVERGING if kind == "signed" else SEQUENTIAL
+    name = {"signed": DIVERGING, "cyclic": CYCLIC}.get(kind, SEQUENTIAL)
+    cmap = colormaps[name].with_extremes(bad=UNDEFINED.get(kind, "white"))
     if kind == "count":
         edges = np.arange(np.floor(low), np.ceil(high) + 2.0) - 0.5
         # One colour a number; the map's 256 colours are spread over the bins.
@@ -236,7 +226,7 @@ def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize
 
 
 def _draw_chains(ax: Axes, frame: StoredFrame, factor: float, points_per_meter: float) -> str:
-    """Lines from grain to grain (or to the wall), as wide as the normal force is large. Returns their caption.
+    """Lines from centre to centre of the grains (or to the wall), as wide as the normal force is large. Returns their caption.
 
     The 99.5th percentile is as wide as half a mean grain; forces below a fiftieth of it are left out, and where
     grains are drawn too small for a line to have an edge, those below the mean.
@@ -253,42 +243,18 @@ def _draw_chains(ax: Axes, frame: StoredFrame, factor: float, points_per_meter: 
         return ""
     i, j = c.i[keep], c.j[keep]
     to_wall = j < 0
-    end_x = np.where(to_wall, c.px[keep], g.x[j])
-    end_y = np.where(to_wall, c.py[keep], g.y[j])
-    segments = np.stack([np.column_stack([g.x[i], g.y[i]]), np.column_stack([end_x, end_y])], axis=1) / factor
+    x, y = bodies.centers(g)
+    end_x = np.where(to_wall, c.px[keep], x[j])
+    end_y = np.where(to_wall, c.py[keep], y[j])
+    segments = np.stack([np.column_stack([x[i], y[i]]), np.column_stack([end_x, end_y])], axis=1) / factor
     width = min(radius, 5.0) * np.minimum(c.normal[keep] / widest, 1.0)
     if not small:
         # Dark lines on light ones stand out from every colour of the grains, in grey print too.
-        _draw_lines(ax, segments, width + np.minimum(width, 1.0), "white")
-    _draw_lines(ax, segments, width, "#B2182B")
+        draw_lines(ax, segments, width + np.minimum(width, 1.0), "white", "edges of chains")
+    draw_lines(ax, segments, width, "#B2182B", "chains")
     scale, name = display_unit("N", widest)
     which = "normal forces above the mean" if small else "normal forces"
     return f"lines: {which}, the widest {widest / scale:.3g} {name} or more"
-
-
-def _draw_lines(ax: Axes, segments: Floats, width: Floats, colour: str) -> None:
-    """Segments (n, 2, 2) of `width` (n,) points, the widest on top.
-
-    They are gathered into at most MOST_PATHS paths of nearly the same width: a path each would take a minute
-    for a million.
-    """
-    from matplotlib.collections import PathCollection
-    from matplotlib.path import Path
-
-    order = np.argsort(width, kind="stable")
-    size = -(-len(order) // MOST_PATHS)
-    parts = [order[k : k + size] for k in range(0, len(order), size)]
-    codes = np.tile(np.array([Path.MOVETO, Path.LINETO], dtype=Path.code_type), size)
-    paths = [Path(segments[part].reshape(-1, 2), codes[: 2 * len(part)]) for part in parts]
-    lines = PathCollection(
-        paths,
-        linewidths=[float(width[part].mean()) for part in parts],
-        edgecolors=colour,
-        facecolors="none",
-        capstyle="round",
-        rasterized=len(width) > RASTER_ABOVE,
-    )
-    ax.add_collection(lines)
 
 
 def _draw_walls(ax: Axes, frame: StoredFrame, box: tuple[float, float, float, float], factor: float) -> None:

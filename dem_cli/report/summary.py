@@ -17,12 +17,13 @@ import numpy as np
 
 from dem_cli import units
 from dem_cli.analysis.sloshing import surface_period, theory_period, thesis_period
+from dem_cli.report.cautions import cautions, largest_of
 from dem_cli.report.motions import Motion, motion_of
 from dem_cli.results import Results, Stage
-from dem_cli.state import Floats
+from dem_cli.state import Floats, Grains
 
 FORMAT = "dem-cli summary"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 # Measures of the sample shown before and after a stage.
 MEASURES = (
@@ -38,9 +39,7 @@ MEASURES = (
     "max_overlap",
 )
 STORED = ("kinetic", "potential", "elastic_normal", "elastic_tangential")
-LOST = ("friction", "dashpot_normal", "dashpot_tangential", "damping", "escaped_energy")
-# Share of the energy put in that the ledger may fail to account for.
-RESIDUAL_LIMIT = 1e-3
+LOST = ("friction", "dashpot_normal", "dashpot_tangential", "bond_energy", "damping", "escaped_energy")
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,9 @@ class Run:
     """What was run. width, height (NaN: walls without end), depth (of the cylinders) [m]; wall_time [s] of
     computing.
 
-    simulated_time [s]; steps_per_second and grain_steps_per_second are per second of wall_time.
+    shape: as the scenario names it; grains: of `elements` discs or ellipses, held together by `bonds` where those are bonded. mean_radius,
+    element_radius [m]: mean radius of the discs of the same area as a grain, and as an element. aspect_ratio: least and
+    largest a/b of an element. simulated_time [s]; steps_per_second and element_steps_per_second are per second of wall_time.
     """
 
     file: str
@@ -57,7 +58,13 @@ class Run:
     version: str
     scenario_hash: str
     seed: int
+    shape: str
     grains: int
+    elements: int
+    bonds: int
+    mean_radius: float
+    element_radius: float
+    aspect_ratio: tuple[float, float]
     width: float
     height: float
     depth: float
@@ -67,7 +74,7 @@ class Run:
     steps: float
     wall_time: float
     steps_per_second: float
-    grain_steps_per_second: float
+    element_steps_per_second: float
 
 
 @dataclass(frozen=True)
@@ -107,7 +114,8 @@ class StageSummary:
     stage that has not ended being its last row; amplitude [m/s^2] and frequency
     [Hz] of a sine; motion: of a record.
 
-    overlap_largest, airborne_largest: largest over all rows of the stage's series.
+    overlap_largest, airborne_largest, bond_gap_largest, bond_slip_largest [m], bond_roll_largest [rad]: largest over all rows of
+    the stage's series; those of bonds count from the start of the run and are NaN where there are no bonds.
     """
 
     number: int
@@ -124,6 +132,9 @@ class StageSummary:
     change: dict[str, float]
     overlap_largest: float
     airborne_largest: float
+    bond_gap_largest: float
+    bond_slip_largest: float
+    bond_roll_largest: float
     sloshing: Sloshing | None
 
 
@@ -165,17 +176,18 @@ def summary(results: Results) -> Summary:
     """Summary of a result file, complete or not."""
     run = _run(results)
     energy = _energy(results)
-    stages = tuple(_stage(results, number, stage) for number, stage in enumerate(results.stages, start=1))
-    return Summary(run=run, stages=stages, energy=energy, warnings=tuple(_warnings(results, run, energy)))
+    stages = tuple(_stage(results, run, number, stage) for number, stage in enumerate(results.stages, start=1))
+    return Summary(run=run, stages=stages, energy=energy, warnings=tuple(cautions(results, run, energy)))
 
 
 def _run(results: Results) -> Run:
     attrs = results.attrs
     time, step = (np.asarray(results.series[name], dtype=float) for name in ("time", "step"))
-    grains = int(attrs.get("grains", 0))
     steps = float(step[-1]) if len(step) else 0.0
     wall = float(attrs.get("wall_time", math.nan))
     rate = steps / wall if wall > 0.0 else math.nan
+    grains = results.frame(0).grains if results.n_frames else None
+    aspect = (math.nan, math.nan) if grains is None else _ends(grains.a / grains.b)
     return Run(
         file=str(results.path),
         title=results.title,
@@ -183,7 +195,13 @@ def _run(results: Results) -> Run:
         version=str(attrs.get("program_version", "")),
         scenario_hash=str(attrs.get("scenario_hash", "")),
         seed=int(attrs.get("seed", 0)),
-        grains=grains,
+        shape=str(results.scenario.get("grains", {}).get("shape", "disc")),
+        grains=results.grain_count,
+        elements=results.element_count,
+        bonds=len(results.bonds),
+        mean_radius=math.nan if grains is None else _mean_radius(results, grains),
+        element_radius=math.nan if grains is None else float(grains.radius.mean()),
+        aspect_ratio=aspect,
         width=float(results.width),
         height=math.nan if results.height is None else float(results.height),
         depth=float(results.depth),
@@ -193,12 +211,25 @@ def _run(results: Results) -> Run:
         steps=steps,
         wall_time=wall,
         steps_per_second=rate,
-        grain_steps_per_second=rate * grains,
+        element_steps_per_second=rate * results.element_count,
     )
 
 
-def _stage(results: Results, number: int, stage: Stage) -> StageSummary:
+def _mean_radius(results: Results, grains: Grains) -> float:
+    """Mean over the grains of the radius of a disc of the same area [m]; the mass of a clump tells its area, overlaps counted once."""
+    if results.grain_count == results.element_count:
+        return float(grains.radius.mean())
+    density = _quantity(results.scenario.get("grains", {}), "density", "kg/m^3")
+    area = np.bincount(grains.body, grains.mass) / (density * results.depth)
+    return float(np.sqrt(area / np.pi).mean())
+
+
+def _stage(results: Results, run: Run, number: int, stage: Stage) -> StageSummary:
     inside = _rows_of(results, number)
+
+    def peak(name: str) -> float:
+        return largest_of(np.asarray(results.series[name], dtype=float)[inside])
+
     before = {name: float(stage.before.get(name, math.nan)) for name in MEASURES}
     after = {name: float(stage.after.get(name, math.nan)) for name in MEASURES}
     if not stage.after and inside.any():
@@ -217,13 +248,16 @@ def _stage(results: Results, number: int, stage: Stage) -> StageSummary:
         before=before,
         after=after,
         change={name: after[name] - before[name] for name in MEASURES},
-        overlap_largest=_largest(np.asarray(results.series["max_overlap"])[inside]),
-        airborne_largest=_largest(np.asarray(results.series["airborne"])[inside]),
-        sloshing=_sloshing(results, number, before["depth"]) if stage.kind == "shake" else None,
+        overlap_largest=peak("max_overlap"),
+        airborne_largest=peak("airborne"),
+        bond_gap_largest=peak("bond_gap") if run.bonds else math.nan,
+        bond_slip_largest=peak("bond_slip") if run.bonds else math.nan,
+        bond_roll_largest=peak("bond_roll") if run.bonds else math.nan,
+        sloshing=_sloshing(results, number, before["depth"], run.mean_radius) if stage.kind == "shake" else None,
     )
 
 
-def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
+def _sloshing(results: Results, number: int, depth: float, mean_radius: float) -> Sloshing:
     container = results.scenario.get("container", {})
     gravity = _quantity(container, "gravity", "m/s^2")
     direction = _quantity(container, "gravity_direction", "rad")
@@ -232,13 +266,12 @@ def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
     frequency = _quantity(_given(results, number), "frequency", "Hz")
     inside = _rows_of(results, number)
     mode = np.asarray(results.series["mode1"], dtype=float)[inside]
-    radius = float(results.frame(0).grains.radius.mean()) if results.n_frames else 0.0
     # The end of one stage and the start of the next may be two rows of the same time.
     time, row = np.unique(np.asarray(results.series["time"], dtype=float)[inside], return_index=True)
     found = surface_period(
         time,
         mode[row],
-        mean_radius=radius,
+        mean_radius=0.0 if math.isnan(mean_radius) else mean_radius,
         driving_period=1.0 / frequency if frequency > 0.0 else None,
     )
     motion = motion_of(results.motions.get(number))
@@ -259,7 +292,7 @@ def _sloshing(results: Results, number: int, depth: float) -> Sloshing:
         is_driving=found.is_driving,
         free_period=found.free_period,
         free_amplitude=found.free_amplitude,
-        mode_largest=_largest(np.abs(mode)),
+        mode_largest=largest_of(np.abs(mode)),
         reason=found.reason,
     )
 
@@ -268,10 +301,10 @@ def _energy(results: Results) -> EnergySummary | None:
     if len(results.series["time"]) == 0:
         return None
     end = {
-        name: float(results.series[name][-1])
+        name: float(results.series[name][-1]) if name in results.series else 0.0  # an old file knows of no bonds
         for name in (*STORED, *LOST, "work", "time_step_energy", "energy_in", "residual")
     }
-    largest = _largest(np.abs(np.asarray(results.series["residual"], dtype=float)))
+    largest = largest_of(np.abs(np.asarray(results.series["residual"], dtype=float)))
     scale = end["energy_in"] if end["energy_in"] > 0.0 else math.nan
     return EnergySummary(
         stored={name: end[name] for name in STORED},
@@ -286,20 +319,6 @@ def _energy(results: Results) -> EnergySummary | None:
         residual_ratio=abs(end["residual"]) / scale,
         residual_largest_ratio=largest / scale,
     )
-
-
-def _warnings(results: Results, run: Run, energy: EnergySummary | None) -> list[str]:
-    lines = []
-    if not run.complete:
-        lines.append(f"the run is incomplete ({run.stop_reason or 'it was cut off'}); numbers hold up to its last row")
-    if energy is None:
-        lines.append("the file holds no series yet")
-    elif energy.residual_largest_ratio > RESIDUAL_LIMIT:
-        lines.append(
-            f"energy: the ledger misses {energy.residual_largest_ratio:.2g} of the energy put in "
-            f"(limit {RESIDUAL_LIMIT:g}): take a smaller time step"
-        )
-    return [*lines, *results.warnings]
 
 
 def _rows_of(results: Results, number: int) -> Any:
@@ -325,9 +344,8 @@ def _quantity(table: dict[str, Any], key: str, unit: str) -> float:
     return float(value) if isinstance(value, int | float) else math.nan
 
 
-def _largest(values: Floats) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.max()) if len(finite) else math.nan
+def _ends(values: Floats) -> tuple[float, float]:
+    return (float(values.min()), float(values.max())) if len(values) else (math.nan, math.nan)
 
 
 def _plain(value: Any) -> Any:

@@ -12,6 +12,14 @@ from dem_cli.report.motions import FORMATS, Motion, Record
 from dem_cli.report.summary import EnergySummary, Run, Sloshing, StageSummary, Summary
 
 NOTHING = "-"
+LOST_LABELS = {
+    "friction": "friction",
+    "dashpot_normal": "dashpot, normal",
+    "dashpot_tangential": "dashpot, tangential",
+    "bond_energy": "bonds",
+    "damping": "damping",
+    "escaped_energy": "escaped grains",
+}
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,7 @@ def blocks(summary: Summary) -> list[Block]:
     """The report of one run."""
     found = [_head(summary.run)]
     for stage in summary.stages:
-        found.append(_stage(stage))
+        found.append(_stage(stage, summary.run))
         if stage.motion is not None:
             found.append(_motion(stage.motion))
         if stage.sloshing is not None:
@@ -65,6 +73,7 @@ def comparison(summaries: Sequence[Summary]) -> Block:
     header = (
         "file",
         "grains",
+        "shape",
         "seed",
         "shaking",
         "void ratio",
@@ -93,6 +102,7 @@ def _row(summary: Summary) -> tuple[str, ...]:
     return (
         run.file,
         str(run.grains),
+        run.shape,
         str(run.seed),
         "; ".join(_shaking(s) for s in shaken) or NOTHING,
         *pairs,
@@ -111,12 +121,12 @@ def _shaking(stage: StageSummary) -> str:
 
 def _head(run: Run) -> Block:
     height = f", {with_unit(run.height, 'm')} high" if math.isfinite(run.height) else ", walls without end"
-    pace = f", {number(run.steps_per_second, ',.0f')} steps/s, {number(run.grain_steps_per_second / 1e6, '.3g')} million grain-steps/s"
+    pace = f", {number(run.steps_per_second, ',.0f')} steps/s, {number(run.element_steps_per_second / 1e6, '.3g')} million element-steps/s"
     rows = (
         ("file", run.file),
         ("program", f"dem-cli {run.version}, engine {run.engine}"),
         ("scenario", f"{run.scenario_hash}, seed {run.seed}"),
-        ("grains", f"{run.grains}"),
+        ("grains", grains_text(run)),
         ("container", f"{with_unit(run.width, 'm')} wide{height}, {with_unit(run.depth, 'm')} deep"),
         (
             "state",
@@ -128,7 +138,21 @@ def _head(run: Run) -> Block:
     return Block(run.title or run.file, (), rows, left=2)
 
 
-def _stage(stage: StageSummary) -> Block:
+def grains_text(run: Run) -> str:
+    """How many grains of which shape, and of how many elements."""
+    if run.bonds:
+        return f"{run.grains} of {run.elements} discs, held together by {run.bonds} bonds"
+    if run.elements > run.grains:
+        return f"{run.grains} rigid clumps of {run.elements} discs"
+    low, high = run.aspect_ratio
+    if not high > 1.0:
+        return f"{run.grains} discs"
+    kinds = "ellipses" if low > 1.0 else "discs and ellipses"
+    ratio = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+    return f"{run.grains} {kinds}, aspect ratio {ratio}"
+
+
+def _stage(stage: StageSummary, run: Run) -> Block:
     own = "" if stage.name in ("", stage.kind) else f" ({stage.name})"
     shaking = f", {_shaking(stage)}" if stage.kind == "shake" else ""
     ended = math.isfinite(stage.end)
@@ -162,6 +186,13 @@ def _stage(stage: StageSummary) -> Block:
         rows.append((label, pair, number(stage.change[name] * factor, change), share))
     rows.append(("most airborne in the stage", number(stage.airborne_largest, ".0f").ljust(width), "", ""))
     rows.append(("largest overlap in the stage", number(stage.overlap_largest, ".1e").ljust(width), "", ""))
+    if math.isfinite(stage.bond_gap_largest):
+        strains = (
+            ("largest bond gap / radius", stage.bond_gap_largest / run.element_radius),
+            ("largest bond slip / radius", stage.bond_slip_largest / run.element_radius),
+            ("largest bond roll [deg]", math.degrees(stage.bond_roll_largest)),
+        )
+        rows += [(label, number(value, ".1e").ljust(width), "", "") for label, value in strains]
     head = "before -> " + ("after" if ended else "so far").ljust(width)
     return Block(title, ("", head, "change", ""), tuple(rows))
 
@@ -246,7 +277,7 @@ def _energy(e: EnergySummary) -> Block:
         row("stored at the end", e.stored_total),
         *(row(f"  {name.replace('_', ', ')}", value) for name, value in e.stored.items()),
         row("lost", e.lost_total),
-        *(row(f"  {name.replace('_energy', ' grains').replace('_', ', ')}", value) for name, value in e.lost.items()),
+        *(row(f"  {LOST_LABELS[name]}", value) for name, value in e.lost.items()),
         row("residual", e.residual),
         row("energy put in", e.energy_in),
         ("residual over energy put in", number(e.residual_ratio, ".1e")),

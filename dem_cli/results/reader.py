@@ -15,11 +15,12 @@ import h5py
 import numpy as np
 
 from dem_cli.errors import ResultsError
+from dem_cli.results.bonds import read_bonds, read_strain
 from dem_cli.results.motions import StoredMotion, read_motions
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, FRAMES, KIND_CONTACT, KIND_WALL_CONTACT, SERIES, TRACKS
 from dem_cli.results.vtkhdf import GROUND, read_energy
 from dem_cli.results.writer import partial_path
-from dem_cli.state import Contacts, Floats, Frame, Grains, Ints, Walls
+from dem_cli.state import Bonds, Contacts, Floats, Frame, Grains, Ints, Walls
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +105,8 @@ class Results:
         self.width = float(self.attrs["width"])
         height = float(self.attrs["height"])
         self.height = None if math.isnan(height) else height  # None: walls without end
+        self.grain_count = int(self.attrs["grains"])
+        self.element_count = int(self.attrs.get("elements", self.grain_count))  # format 1 knew discs only
         self.series = Series(file["series"])
         self.n_frames = int(file["VTKHDF/Steps"].attrs["NSteps"])
 
@@ -126,6 +129,10 @@ class Results:
         group = self._file["walls"]
         ends = {name: np.asarray(group[name][:]) for name in ("x0", "y0", "x1", "y1", "friction")}
         return Walls(name=tuple(group["name"].asstr()[:]), **ends)
+
+    @cached_property
+    def bonds(self) -> Bonds:
+        return read_bonds(self._file)
 
     @cached_property
     def stages(self) -> list[Stage]:
@@ -185,7 +192,7 @@ class Results:
         if not -self.n_frames <= k < self.n_frames:
             raise IndexError(f"frame {k} of {self.n_frames}")
         k %= self.n_frames
-        row = {name: float(self._file["frames"][name][k]) for name in FRAMES}
+        row = {name: float(self._file["frames"][name][k]) for name in FRAMES if name in self._file["frames"]}
         grains, coordination, stress = self._grains(k)
         return StoredFrame(
             step=int(row["step"]),
@@ -199,6 +206,7 @@ class Results:
             energy_in=row["energy_in"],
             due=frozenset({"frames"}),
             contacts=self._contacts(k, len(grains)),
+            bonds=read_strain(self._file, k),
             unbalanced=row["unbalanced"],
             stage_start=bool(row["stage_start"]),
             stage_end=bool(row["stage_end"]),
@@ -209,8 +217,9 @@ class Results:
 
     def _grains(self, k: int) -> tuple[Grains, Ints, Floats]:
         root, data = self._file["VTKHDF"], self._file["VTKHDF/PointData"]
-        n, start = int(self.attrs["grains"]), int(root["Steps/PointOffsets"][k])
+        n, start = self.element_count, int(root["Steps/PointOffsets"][k])
         rows = slice(start, start + n)
+        discs = "body" not in data  # format 1
         grains = Grains(
             id=data["id"][:n].astype(np.int64),
             x=root["Points"][rows, 0],
@@ -223,9 +232,9 @@ class Results:
             mass=data["mass"][:n],
             inertia=data["inertia"][:n],
             escaped=data["escaped"][rows].astype(bool),
-            a=data["radius"][:n],
-            b=data["radius"][:n],
-            body=np.arange(n, dtype=np.int64),
+            a=data["radius" if discs else "a"][:n],
+            b=data["radius" if discs else "b"][:n],
+            body=np.arange(n, dtype=np.int64) if discs else data["body"][:n].astype(np.int64),
         )
         stress = np.stack([data["stress"][rows, column] for column in (0, 1, 3, 4)], axis=1).astype(np.float64)
         return grains, data["coordination"][rows].astype(np.int64), stress

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 FORMAT = "dem-cli results"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1: discs only; no semi-axes, bodies or bonds, and `grains` counts what `elements` counts now
 
 # Series over time: name -> (unit, definition). The writer stores both as attributes of the dataset.
 SERIES: dict[str, tuple[str, str]] = {
@@ -64,7 +64,8 @@ SERIES: dict[str, tuple[str, str]] = {
     "ground_ay": ("m/s^2", "acceleration of the container"),
 }
 
-# Tracks of chosen grains over /tracks/time, shape (times, grains), in the container's frame.
+# Tracks of chosen grains over /tracks/time, shape (times, grains), in the container's frame; of a grain of several elements: centre of
+# mass, and turn of the elements about it.
 TRACKS: dict[str, tuple[str, str]] = {
     "x": ("m", "position"),
     "y": ("m", "position"),
@@ -103,6 +104,7 @@ FRAMES: dict[str, tuple[str, str]] = {
     "friction": SERIES["friction"],
     "dashpot_normal": SERIES["dashpot_normal"],
     "dashpot_tangential": SERIES["dashpot_tangential"],
+    "bond_energy": SERIES["bond_energy"],
     "damping": SERIES["damping"],
     "escaped_energy": SERIES["escaped_energy"],
     "time_step_energy": SERIES["time_step_energy"],
@@ -112,6 +114,21 @@ FRAMES: dict[str, tuple[str, str]] = {
     "unbalanced": SERIES["unbalanced"],
     "stage_start": ("1", "1 where a stage begins"),
     "stage_end": ("1", "1 where a stage ends"),
+}
+
+# Bonds between elements of a grain, over /bonds/bond; there is no such group where there are none.
+BONDS: dict[str, tuple[str, str]] = {
+    "i": ("1", "number of the first element"),
+    "j": ("1", "number of the second element"),
+    "normal": ("N s/m", "viscosity against moving apart or closer"),
+    "tangential": ("N s/m", "viscosity against sliding at the common point"),
+    "rolling": ("N m s", "viscosity against turning of one element against the other, 0: they roll freely"),
+}
+# What the bonds have given since the start, over /bonds/time, a row a frame, and /bonds/bond.
+BOND_STRAIN: dict[str, tuple[str, str]] = {
+    "gap": ("m", "centres further apart (+) or closer (-)"),
+    "slip": ("m", "sliding at the common point"),
+    "roll": ("rad", "turn of the second element against the first, anticlockwise"),
 }
 
 
@@ -124,27 +141,35 @@ class Column(NamedTuple):
     width: int = 1
     stored: tuple[int, ...] = ()  # of `width` columns, those that are ever other than zero
     static: bool = False  # written once and shared by all frames
-    fill: int = 0  # value on helper points (and, for cells, on the grains' vertices)
+    fill: int = 0  # value on helper points (and, for cells, on the elements' vertices)
 
 
-# Points of a frame: first the grains, then two ends a wall, then one foot point a contact with a wall.
+# Points of a frame: first the elements, then two ends a wall, then one foot point a contact with a wall.
 POINT_DATA: dict[str, Column] = {
-    "id": Column("1", "number of the grain, -1 on helper points", "i4", static=True, fill=-1),
-    "radius": Column("m", "radius", "f8", static=True),
+    "id": Column("1", "number of the element (a disc or ellipse), -1 on helper points", "i4", static=True, fill=-1),
+    "body": Column(
+        "1", "number of the grain that the element belongs to, -1 on helper points", "i4", static=True, fill=-1
+    ),
+    "radius": Column("m", "radius of the disc of equal area", "f8", static=True),
+    "a": Column("m", "larger semi-axis", "f8", static=True),
+    "b": Column("m", "smaller semi-axis", "f8", static=True),
     "mass": Column("kg", "mass of the cylinder of the scenario's depth", "f8", static=True),
     "inertia": Column("kg m^2", "moment of inertia about the centre", "f8", static=True),
     "shape": Column("m", "tensor whose principal values are the diameters", "f8", 9, (0, 4), static=True),
-    "angle": Column("rad", "rotation since the start, anticlockwise", "f8"),
+    "angle": Column("rad", "angle of the semi-axis a, anticlockwise from +x", "f8"),
     "velocity": Column("m/s", "velocity in the container's frame", "f8", 3, (0, 1)),
     "spin": Column("rad/s", "angular velocity, anticlockwise", "f8"),
     "coordination": Column("1", "number of contacts", "i2"),
-    "stress": Column("Pa", "mean stress tensor of the grain, compression > 0", "f4", 9, (0, 1, 3, 4)),
+    "stress": Column("Pa", "mean stress tensor of the element, compression > 0", "f4", 9, (0, 1, 3, 4)),
     "escaped": Column("1", "1 once the grain has left the container", "u1"),
 }
 
-# Cells of a frame: first one vertex a grain, then one line a contact, then one line a wall.
+# In a file with ellipses the shape turns with the element; single precision, as a, b and angle hold every bit.
+TURNING_SHAPE = POINT_DATA["shape"]._replace(dtype="f4", stored=(0, 1, 3, 4), static=False)
+
+# Cells of a frame: first one vertex an element, then one line a contact, one line a wall, one line a bond.
 CELL_DATA: dict[str, Column] = {
-    "kind": Column("1", "0 grain, 1 contact of two grains, 2 contact with a wall, 3 wall, 4 nothing", "u1"),
+    "kind": Column("1", "0 element, 1 contact of two elements, 2 contact with a wall, 3 wall, 4 nothing, 5 bond", "u1"),
     "wall": Column("1", "number of the wall, -1 if none", "i2", fill=-1),
     "sliding": Column("1", "1 where the friction limit is reached", "u1"),
     "normal_force": Column("N", "normal force, compression > 0", "f8"),
@@ -154,4 +179,4 @@ CELL_DATA: dict[str, Column] = {
     "normal": Column("1", "unit normal from the first body to the second", "f8", 3, (0, 1)),
     "contact_point": Column("m", "contact point", "f8", 3, (0, 1)),
 }
-KIND_GRAIN, KIND_CONTACT, KIND_WALL_CONTACT, KIND_WALL, KIND_NOTHING = range(5)
+KIND_ELEMENT, KIND_CONTACT, KIND_WALL_CONTACT, KIND_WALL, KIND_NOTHING, KIND_BOND = range(6)

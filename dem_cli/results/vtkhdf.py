@@ -1,8 +1,9 @@
-"""The temporal PolyData under /VTKHDF: grains as vertices, contacts and walls as lines. One frame is one step.
+"""The temporal PolyData under /VTKHDF: elements as vertices, contacts, walls and bonds as lines. One frame is one step.
 
 Format: VTKHDF 2.0 (docs.vtk.org, "VTKHDF File Format"). What no frame changes (static columns of the schema, connectivity of
 the vertices) is written once, and all steps point at it. Vectors are chunked column by column, so that the zero z of a 2D run
-takes no place in the file; nor do the zeros that contact data has on the grains' vertices.
+takes no place in the file; nor do the zeros that contact data has on the elements' vertices. The tensor of a sample of discs alone
+is written once too; where there are ellipses it turns with them.
 """
 
 from __future__ import annotations
@@ -13,20 +14,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dem_cli.results.bonds import append_strain, create_bonds
 from dem_cli.results.schema import (
     CELL_DATA,
     FRAMES,
+    KIND_BOND,
     KIND_CONTACT,
     KIND_NOTHING,
     KIND_WALL,
     KIND_WALL_CONTACT,
     POINT_DATA,
+    TURNING_SHAPE,
     Column,
 )
 from dem_cli.results.tables import ROWS_PER_CHUNK, Rows, Table, describe
-from dem_cli.state import Contacts, Energy, Floats, Frame, Grains, Ints, Walls
+from dem_cli.state import Bonds, Contacts, Energy, Floats, Frame, Grains, Ints, Walls
 
-Arrays = Mapping[str, tuple[npt.NDArray[Any], ...]]
+Arrays = dict[str, tuple[npt.NDArray[Any], ...]]
 ENERGY = {  # field of Energy -> name in the file
     "kinetic": "kinetic",
     "potential": "potential",
@@ -35,6 +39,7 @@ ENERGY = {  # field of Energy -> name in the file
     "friction": "friction",
     "dashpot_normal": "dashpot_normal",
     "dashpot_tangential": "dashpot_tangential",
+    "bonds": "bond_energy",
     "damping": "damping",
     "escaped": "escaped_energy",
     "time_step": "time_step_energy",
@@ -50,8 +55,8 @@ def drawn_walls(walls: Walls, grains: Grains) -> Floats:
     if len(grains) == 0 or len(ends) == 0:
         return np.nan_to_num(ends, posinf=0.0, neginf=0.0)
     for axis, center in ((0, grains.x), (1, grains.y)):
-        low, high = float(np.min(center - grains.radius)), float(np.max(center + grains.radius))
-        reach = 10.0 * float(np.ptp(np.concatenate([grains.x, grains.y])) + 2.0 * np.max(grains.radius))
+        low, high = float(np.min(center - grains.a)), float(np.max(center + grains.a))
+        reach = 10.0 * float(np.ptp(np.concatenate([grains.x, grains.y])) + 2.0 * np.max(grains.a))
         column = ends[:, axis]
         near = column[np.isfinite(column) & (column > low - reach) & (column < high + reach)]
         ends[:, axis] = np.clip(column, min([low, *near]), max([high, *near]))
@@ -61,11 +66,14 @@ def drawn_walls(walls: Walls, grains: Grains) -> Floats:
 class FrameWriter:
     """Appends frames to /VTKHDF and /frames of an open file; `commit` makes them visible to readers of the format."""
 
-    def __init__(self, file: Any, grains: Grains, walls: Walls) -> None:
+    def __init__(self, file: Any, grains: Grains, walls: Walls, bonds: Bonds) -> None:
         self._n = len(grains)
-        self._radius = grains.radius.copy()
+        self._fixed = {name: getattr(grains, name).copy() for name in ("radius", "a", "b", "body")}
+        self._turning = bool(np.any(grains.a != grains.b))
+        self._columns = {**POINT_DATA, **({"shape": TURNING_SHAPE} if self._turning else {})}
         self._walls = drawn_walls(walls, grains)
-        # A quarter of the grains a chunk: small enough that the empty part of contact data falls into chunks never written.
+        self._bonds = np.stack([bonds.i, bonds.j], axis=1)
+        # A quarter of the elements a chunk: small enough that the empty part of contact data falls into chunks never written.
         self._chunk = int(2 ** np.clip(np.ceil(np.log2(max(1, self._n) / 4)), 8, 16))
         self._points = self._cells = self._lines = self.steps = 0
         self._spare: list[Rows] = []
@@ -75,17 +83,15 @@ class FrameWriter:
         self._root.attrs.create("Type", np.bytes_("PolyData"))
         self._step_data = self._create_steps()
         self._create_topology()
-        self._point_data = self._create_columns("PointData", POINT_DATA)
+        self._point_data = self._create_columns("PointData", self._columns)
         self._cell_data = self._create_columns("CellData", CELL_DATA)
         self._xyz = self._rows(self._root, "Points", Column("m", "position", "f8", 3, (0, 1)))
-        diameter = 2.0 * grains.radius
         self._once: Arrays = {
-            "id": (grains.id,),
-            "radius": (grains.radius,),
-            "mass": (grains.mass,),
-            "inertia": (grains.inertia,),
-            "shape": (diameter, diameter),
+            name: (getattr(grains, name),) for name in ("id", "body", "radius", "a", "b", "mass", "inertia")
         }
+        if not self._turning:
+            self._once["shape"] = (2.0 * grains.radius, 2.0 * grains.radius)
+        self._strain = create_bonds(file, bonds)
         self._table = Table(file.create_group("frames"), FRAMES)
 
     def _column(self, group: Any, name: str, column: Column) -> Any:
@@ -120,8 +126,8 @@ class FrameWriter:
     def _create_steps(self) -> dict[str, Rows]:
         root, steps = self._root, self._root.create_group("Steps")
         steps.attrs["NSteps"] = 0
-        moving = [f"Steps/PointDataOffsets/{name}" for name, column in POINT_DATA.items() if not column.static]
-        fixed = [f"Steps/PointDataOffsets/{name}" for name, column in POINT_DATA.items() if column.static]
+        moving = [f"Steps/PointDataOffsets/{name}" for name, column in self._columns.items() if not column.static]
+        fixed = [f"Steps/PointDataOffsets/{name}" for name, column in self._columns.items() if column.static]
         cells = [f"Steps/CellDataOffsets/{name}" for name in CELL_DATA]
         no_cells = ("Offsets", "NumberOfCells", "NumberOfConnectivityIds")
         fixed += [f"{group}/{name}" for group in ("Polygons", "Strips") for name in no_cells]
@@ -158,27 +164,34 @@ class FrameWriter:
 
     def size(self, frame: Frame) -> int:
         """Bytes that a frame takes, to within a few percent."""
-        return 71 * self._n + 90 * (0 if frame.contacts is None else len(frame.contacts))
+        elements = (87 if self._turning else 71) * self._n
+        return elements + 90 * (0 if frame.contacts is None else len(frame.contacts)) + 43 * len(self._bonds)
 
     def append(self, frame: Frame, coordination: Ints, stress: Floats) -> int:
         """Hand one frame to HDF5. coordination (n,), stress (n, 4) [Pa]: xx, xy, yx, yy. Returns its bytes."""
         grains, contacts = frame.grains, frame.contacts
         if contacts is None:
             raise ValueError("a frame without contacts cannot be written")
-        if not np.array_equal(grains.radius, self._radius):
+        if not all(np.array_equal(getattr(grains, name), values) for name, values in self._fixed.items()):
             raise ValueError("the grains of a frame are not those that the file was begun with")
+        append_strain(self._strain, frame.time, frame.bonds)
         feet = np.flatnonzero(contacts.j < 0)
         ends = len(self._walls)
         points = self._n + ends + len(feet)
-        lines = max(1, len(contacts) + ends // 2)  # a step with no line would make VTK misread the next one
+        lines = max(
+            1, len(contacts) + ends // 2 + len(self._bonds)
+        )  # a step with no line would make VTK misread the next one
 
         for axis, center, foot in ((0, grains.x, contacts.px), (1, grains.y, contacts.py)):
             column = np.concatenate([center, self._walls[:, axis], foot[feet]])
             self._xyz.put(self._points, column, axis)
         self._append_static(points)
-        self._write(self._point_data, POINT_DATA, self._points, points, _of_grains(grains, coordination, stress))
+        moving = _of_grains(grains, coordination, stress)
+        if self._turning:
+            moving["shape"] = _shape(grains)
+        self._write(self._point_data, self._columns, self._points, points, moving)
         first = self._cells + self._n
-        contact_arrays = _of_contacts(contacts, lines, ends // 2)
+        contact_arrays = _of_contacts(contacts, lines, ends // 2, len(self._bonds))
         self._write(self._cell_data, CELL_DATA, first, lines, contact_arrays)
         self._append_lines(contacts, feet, lines)
         self._append_step(frame.time, points, lines)
@@ -200,18 +213,20 @@ class FrameWriter:
     def _append_static(self, points: int) -> None:
         """The static columns need as many rows as the longest frame has points."""
         if self.steps == 0:
-            self._write(self._point_data, POINT_DATA, 0, points, self._once)
+            self._write(self._point_data, self._columns, 0, points, self._once)
         for name in self._once:
             self._point_data[name].reach(points)
 
     def _append_lines(self, contacts: Contacts, feet: Ints, lines: int) -> None:
-        """Contacts, then walls, as pairs of points."""
+        """Contacts, then walls, then bonds, as pairs of points."""
         ends = len(self._walls)
         pairs = np.zeros((lines, 2), dtype=np.int32)
         pairs[: len(contacts), 0] = contacts.i
         pairs[: len(contacts), 1] = contacts.j
         pairs[feet, 1] = self._n + ends + np.arange(len(feet))
-        pairs[len(contacts) : len(contacts) + ends // 2] = self._n + np.arange(ends).reshape(-1, 2)
+        walls = slice(len(contacts), len(contacts) + ends // 2)
+        pairs[walls] = self._n + np.arange(ends).reshape(-1, 2)
+        pairs[walls.stop : walls.stop + len(self._bonds)] = self._bonds
         self._connectivity.append(pairs.ravel())
         # One entry more than cells in every step, so that step k starts k entries after the cells before it.
         self._vertex_offsets.append(np.arange(self._n + 1))
@@ -238,6 +253,8 @@ class FrameWriter:
     def flush(self) -> None:
         """Hand over the rows with one entry a step."""
         self._table.flush()
+        if self._strain is not None:
+            self._strain.flush()
         if self._pending:
             for name, rows in self._step_data.items():
                 rows.append(np.array([step[name] for step in self._pending]))
@@ -251,6 +268,8 @@ class FrameWriter:
     def commit(self) -> None:
         """Count the frames handed over so far, once their data have reached the file: readers of VTKHDF go by that."""
         self._table.commit()
+        if self._strain is not None:
+            self._strain.commit()
         self._root["Steps"].attrs.modify("NSteps", self.steps)
 
 
@@ -265,10 +284,18 @@ def _of_grains(grains: Grains, coordination: Ints, stress: Floats) -> Arrays:
     }
 
 
-def _of_contacts(contacts: Contacts, lines: int, walls: int) -> Arrays:
+def _shape(grains: Grains) -> tuple[Floats, ...]:
+    """xx, xy, yx, yy of the tensor whose principal values are the diameters 2a, along `angle`, and 2b, shape (n,) each [m]."""
+    c, s = np.cos(grains.angle), np.sin(grains.angle)
+    mixed = 2.0 * (grains.a - grains.b) * c * s
+    return 2.0 * (grains.a * c**2 + grains.b * s**2), mixed, mixed, 2.0 * (grains.a * s**2 + grains.b * c**2)
+
+
+def _of_contacts(contacts: Contacts, lines: int, walls: int, bonds: int) -> Arrays:
     kind = np.full(lines, KIND_NOTHING, dtype=np.uint8)
     kind[: len(contacts)] = np.where(contacts.j < 0, KIND_WALL_CONTACT, KIND_CONTACT)
     kind[len(contacts) : len(contacts) + walls] = KIND_WALL
+    kind[len(contacts) + walls : len(contacts) + walls + bonds] = KIND_BOND
     wall = np.full(lines, -1, dtype=np.int16)
     wall[: len(contacts)] = np.where(contacts.j < 0, -1 - contacts.j, -1)
     wall[len(contacts) : len(contacts) + walls] = np.arange(walls)
@@ -304,4 +331,5 @@ def frame_row(frame: Frame) -> list[float]:
 
 
 def read_energy(row: Mapping[str, float]) -> Energy:
-    return Energy(**{field: row[name] for field, name in ENERGY.items()})
+    """What an old file does not know of is 0."""
+    return Energy(**{field: row.get(name, 0.0) for field, name in ENERGY.items()})

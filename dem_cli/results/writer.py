@@ -22,8 +22,9 @@ from dem_cli.results.motions import write_motion
 from dem_cli.results.provenance import provenance
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, SERIES, STAGES, SURFACE, TRACKS
 from dem_cli.results.tables import TEXT, Table, describe, make_scale
+from dem_cli.results.tracks import GrainTracks
 from dem_cli.results.vtkhdf import FrameWriter
-from dem_cli.state import Floats, Frame, Grains, Ints, Walls
+from dem_cli.state import Bonds, Floats, Frame, Grains, Ints, Walls
 
 FLUSH_BYTES = 4_000_000
 FLUSH_SECONDS = 1.0
@@ -45,8 +46,8 @@ class ResultWriter:
     Raises ResultsError before anything is written if path or its partial file exists and `force` is not given, or if the file
     cannot be made; RunError if a write fails later.
 
-    container: width and height [m]; height None or absent for walls without end. tracks: indices of the grains to follow.
-    surface_x: centres of the bins of the free surface [m].
+    container: width and height [m]; height None or absent for walls without end. tracks: numbers of the grains (not elements) to
+    follow. surface_x: centres of the bins of the free surface [m]. bonds: None where there are none.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class ResultWriter:
         container: Mapping[str, float | None],
         tracks: Ints | None,
         surface_x: Floats,
+        bonds: Bonds | None = None,
         force: bool = False,
     ) -> None:
         self.path = Path(path)
@@ -89,20 +91,23 @@ class ResultWriter:
             "scenario_hash": scenario_hash,
             "seed": seed,
             "engine": engine,
-            "grains": len(grains),
+            "grains": grains.grain_count,
+            "elements": len(grains),
             "depth": depth,
             "width": container["width"],
             "height": np.nan if container.get("height") is None else container["height"],
         }
         try:
             with self._guard():
-                self._create_groups(attributes, grains, walls, surface_x)
+                self._create_groups(attributes, grains, walls, surface_x, bonds or Bonds.none())
                 self.flush()
         except RunError as error:
             self._partial.unlink(missing_ok=True)
             raise ResultsError(f"{self._partial}: cannot be written ({_cause(error.__cause__)})") from error
 
-    def _create_groups(self, attributes: Mapping[str, Any], grains: Grains, walls: Walls, surface_x: Floats) -> None:
+    def _create_groups(
+        self, attributes: Mapping[str, Any], grains: Grains, walls: Walls, surface_x: Floats, bonds: Bonds
+    ) -> None:
         root = {
             "format": FORMAT,
             "format_version": FORMAT_VERSION,
@@ -117,11 +122,11 @@ class ResultWriter:
             self._file.attrs[name] = value
         self._series = Table(self._file.create_group("series"), SERIES)
         self._create_surface(surface_x)
-        self._tracks = self._create_tracks()
+        self._tracks = self._create_tracks(grains)
         self._stages = self._create_stages()
         self._create_walls(walls)
         self._warnings = self._file.create_dataset("warnings", (0,), TEXT, maxshape=(None,), chunks=(64,))
-        self._frames = FrameWriter(self._file, grains, walls)
+        self._frames = FrameWriter(self._file, grains, walls, bonds)
         self._parts = [self._series, self._surface, self._frames, *([self._tracks] if self._tracks else [])]
 
     @property
@@ -135,9 +140,10 @@ class ResultWriter:
         axis = make_scale(group, "x", np.asarray(x, dtype=np.float64), unit, definition)
         self._surface = Table(group, {"eta": SURFACE["eta"]}, axis)
 
-    def _create_tracks(self) -> Table | None:
+    def _create_tracks(self, grains: Grains) -> Table | None:
         if self._track_ids is None:
             return None
+        self._followed = GrainTracks(self._track_ids, grains)
         group = self._file.create_group("tracks")
         return Table(group, TRACKS, make_scale(group, "grain", self._track_ids, "1", "number of the grain"))
 
@@ -194,18 +200,17 @@ class ResultWriter:
             self._flush_if_due()
 
     def append_frame(self, frame: Frame, coordination: Ints, stress: Floats) -> None:
-        """One step of /VTKHDF. coordination (n,); stress of each grain (n, 4) [Pa]: xx, xy, yx, yy."""
+        """One step of /VTKHDF. coordination (n,); stress of each element (n, 4) [Pa]: xx, xy, yx, yy."""
         with self._guard():
             self._need_room(self._frames.size(frame))
             self._bytes += self._frames.append(frame, coordination, stress)
             self._flush_if_due()
 
     def append_tracks(self, time: float, grains: Grains) -> None:
-        """State of the followed grains; `grains` are all grains of the run. Nothing happens if none is followed."""
+        """State of the followed grains; `grains` are all elements of the run. Nothing happens if none is followed."""
         if self._tracks is None:
             return
-        row = [getattr(grains, name)[self._track_ids] for name in self._tracks.names]
-        self._bytes += self._tracks.append(time, row)
+        self._bytes += self._tracks.append(time, self._followed.row(grains))
         with self._guard():
             self._flush_if_due()
 
