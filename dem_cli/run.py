@@ -36,7 +36,8 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
         target, scenario_text=scenario.source, resolved_toml=scenario.resolved_toml(), scenario_hash=scenario.hash,
         seed=scenario.seed, engine=scenario.engine, title=scenario.title, grains=assembly.grains, walls=assembly.walls,
         depth=scenario.depth, container={"width": container.width, "height": container.height},
-        tracks=np.array(output.tracks.grains) if output.tracks else None, surface_x=surface_x, force=force,
+        tracks=np.array(output.tracks.grains) if output.tracks else None, surface_x=surface_x, bonds=assembly.bonds,
+        force=force,
     ) as writer:  # fmt: skip
         row: dict[str, float] | None = None
         try:
