@@ -36,8 +36,8 @@ def bonded(path: Path, strain: tuple[float, float, float], rolling: float = 0.0)
     ("shape", "words"),
     [
         ("ellipse", "20 discs and ellipses, aspect ratio 1 to 2.5"),
-        ("bonded", "20 of 40 discs, held together by 20 bonds"),
-        ("clump", "20 rigid clumps of 60 discs"),
+        ("bonded", "20, made of 40 discs and 20 bonds"),
+        ("clump", "20 rigid clumps, made of 60 discs"),
     ],
 )
 def test_run_tells_grains_and_elements(tmp_path: Path, shape: str, words: str) -> None:

@@ -141,9 +141,9 @@ def _head(run: Run) -> Block:
 def grains_text(run: Run) -> str:
     """How many grains of which shape, and of how many elements."""
     if run.bonds:
-        return f"{run.grains} of {run.elements} discs, held together by {run.bonds} bonds"
+        return f"{run.grains}, made of {run.elements} discs and {run.bonds} bonds"
     if run.elements > run.grains:
-        return f"{run.grains} rigid clumps of {run.elements} discs"
+        return f"{run.grains} rigid clumps, made of {run.elements} discs"
     low, high = run.aspect_ratio
     if not high > 1.0:
         return f"{run.grains} discs"
