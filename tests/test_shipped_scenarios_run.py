@@ -24,6 +24,14 @@ SHORTER = {
     "shake-record": ("stage.shake.duration=0.9 s",),
     "thesis-discs-400gal-10hz": (*SMALLER, "stage.shake.duration=0.5 s"),
     "thesis-discs-1200gal-1hz": (*SMALLER, "stage.shake.duration=1 s"),
+    "thesis-ellipses-400gal-10hz": (*SMALLER, "stage.shake.duration=0.4 s"),
+    "thesis-pairs-400gal-10hz": (
+        "grains.count=150",
+        "packing.grid.columns=6",
+        "container.width=37.5 cm",
+        "output.tracks.grains=[0, 150, 299]",
+        "stage.shake.duration=0.4 s",
+    ),
 }
 
 
