@@ -26,11 +26,11 @@ from results_samples import (
     stress,
     write_all,
 )
-from shape_samples import in_bodies, pairs, some_ellipses, strain, triangles, turned, with_shape
+from shape_samples import in_bodies, some_ellipses, strain, with_shape
 
 from dem_cli.results import open_results
 from dem_cli.results.schema import BOND_STRAIN, KIND_BOND, KIND_CONTACT, KIND_NOTHING, KIND_WALL
-from dem_cli.state import Bonds, Frame, Grains
+from dem_cli.state import Bonds, Frame
 
 BODIES = [0, 0, 1, 2, 2, 2]
 BONDS = Bonds(
@@ -215,7 +215,7 @@ def test_tensor_glyph_draws_the_ellipse(tmp_path: Path) -> None:
 @pytest.mark.parametrize("walls", [box(), no_walls()], ids=["walls", "none"])
 def test_vtk_reads_bonds_as_lines_of_their_own_kind(tmp_path: Path, walls: Any) -> None:
     support = pytest.importorskip("vtkmodules.util.numpy_support")
-    touching = [[(i, j) for i, j in pairs if j >= -len(walls)] for pairs in PAIRS]
+    touching = [[(i, j) for i, j in some if j >= -len(walls)] for some in PAIRS]
     frames = [replace(bonded_frame(k), contacts=some_contacts(p, seed=k)) for k, p in enumerate(touching)]
     path = write_frames(tmp_path / "out.h5", frames, BONDS, walls=walls)
     for k, data in vtk_steps(path, [0, 1, 2, 3, 1]):
@@ -242,54 +242,14 @@ def test_xarray_opens_the_bonds(tmp_path: Path) -> None:
         assert data.slip.attrs["units"] == "m"
 
 
-# ----------------------------------------------------------------------------------------------- tracks
-
-
-def tracked(path: Path, frames: list[Grains], follow: list[int]) -> dict[str, Any]:
-    with open_writer(path, grains=frames[0], tracks=np.array(follow)) as writer:
-        for k, grains in enumerate(frames):
-            writer.append_tracks(0.1 * k, grains)
+def test_tracks_follow_elements(tmp_path: Path) -> None:
+    """As in the thesis, which numbers the discs of its pairs: ids are those of discs, whatever they are joined to."""
+    moving = bonded_frame(1).grains
+    with open_writer(tmp_path / "out.h5", grains=moving, bonds=BONDS, tracks=np.array([1, 0])) as writer:
+        writer.append_tracks(0.0, moving)
         writer.finish("done")
-    with open_results(path) as results:
+    with open_results(tmp_path / "out.h5") as results:
         assert results.tracks is not None
-        assert results.tracks.ids.tolist() == follow
-        return results.tracks.arrays
-
-
-def test_tracks_of_a_clump_are_those_of_a_rigid_body(tmp_path: Path) -> None:
-    """Three full turns in steps of a third, on a straight path: no jump, whatever element one looks at."""
-    start = triangles(np.array([0.1, 0.5]), np.array([0.3, 0.4]), np.array([0.7, -2.0]), 0.01, 0.012)
-    start = replace(start, mass=start.mass * np.array([1.0, 2.0, 0.5, 1.0, 1.0, 1.0]))
-    turns = 2.0 * np.pi / 3.0 * np.arange(10)
-    frames = [turned(start, 0, angle, (0.01 * k, -0.02 * k)) for k, angle in enumerate(turns)]
-    arrays = tracked(tmp_path / "out.h5", frames, [1, 0])
-    centre = [start.mass[:3] @ values[:3] / start.mass[:3].sum() for values in (start.x, start.y)]
-    k = np.arange(10)
-    np.testing.assert_allclose(arrays["x"][:, 1], centre[0] + 0.01 * k, atol=1e-15)
-    np.testing.assert_allclose(arrays["y"][:, 1], centre[1] - 0.02 * k, atol=1e-15)
-    np.testing.assert_allclose(arrays["angle"][:, 1], 0.7 + turns, atol=1e-12)
-    np.testing.assert_allclose(arrays["angle"][:, 0], -2.0, atol=1e-15)
-
-
-def test_spin_of_a_clump_is_its_angular_velocity(tmp_path: Path) -> None:
-    start = triangles(np.array([0.1]), np.array([0.3]), np.array([0.7]), 0.01, 0.012)
-    cx, cy = start.x.mean(), start.y.mean()
-    omega = 3.5
-    moving = replace(start, vx=0.2 - omega * (start.y - cy), vy=-0.1 + omega * (start.x - cx), spin=np.full(3, omega))
-    arrays = tracked(tmp_path / "out.h5", [moving], [0])
-    assert [arrays[name][0, 0] for name in ("vx", "vy", "spin")] == pytest.approx([0.2, -0.1, omega], rel=1e-12)
-
-
-def test_a_pair_that_rolls_like_gears_does_not_turn(tmp_path: Path) -> None:
-    start, _ = pairs(np.array([0.2]), np.array([0.3]), np.array([0.4]), 0.01)
-    rolled = replace(start, angle=start.angle + np.array([1.0, -1.0]), spin=np.array([5.0, -5.0]))
-    arrays = tracked(tmp_path / "out.h5", [start, rolled], [0])
-    np.testing.assert_allclose(arrays["angle"][:, 0], 0.4, atol=1e-14)
-    assert arrays["spin"][1, 0] == 0.0
-
-
-def test_tracks_count_grains_and_keep_every_bit_of_single_elements(tmp_path: Path) -> None:
-    frames = [in_bodies(some_grains(k), [0, 0, 1, 2, 2, 3]) for k in range(3)]
-    arrays = tracked(tmp_path / "out.h5", frames, [1, 3])
-    for name, values in arrays.items():
-        assert np.array_equal(values, [getattr(grains, name)[[2, 5]] for grains in frames]), name
+        assert results.tracks.ids.tolist() == [1, 0]
+        for name in ("x", "y", "angle", "vx", "vy", "spin"):
+            np.testing.assert_array_equal(results.tracks.arrays[name], getattr(moving, name)[[1, 0]][None])

@@ -64,8 +64,7 @@ SERIES: dict[str, tuple[str, str]] = {
     "ground_ay": ("m/s^2", "acceleration of the container"),
 }
 
-# Tracks of chosen grains over /tracks/time, shape (times, grains), in the container's frame; of a grain of several elements: centre of
-# mass, and turn of the elements about it.
+# Tracks of chosen discs and ellipses over /tracks/time, shape (times, elements), in the container's frame.
 TRACKS: dict[str, tuple[str, str]] = {
     "x": ("m", "position"),
     "y": ("m", "position"),

@@ -22,7 +22,6 @@ from dem_cli.results.motions import write_motion
 from dem_cli.results.provenance import provenance
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, SERIES, STAGES, SURFACE, TRACKS
 from dem_cli.results.tables import TEXT, Table, describe, make_scale
-from dem_cli.results.tracks import GrainTracks
 from dem_cli.results.vtkhdf import FrameWriter
 from dem_cli.state import Bonds, Floats, Frame, Grains, Ints, Walls
 
@@ -122,7 +121,7 @@ class ResultWriter:
             self._file.attrs[name] = value
         self._series = Table(self._file.create_group("series"), SERIES)
         self._create_surface(surface_x)
-        self._tracks = self._create_tracks(grains)
+        self._tracks = self._create_tracks()
         self._stages = self._create_stages()
         self._create_walls(walls)
         self._warnings = self._file.create_dataset("warnings", (0,), TEXT, maxshape=(None,), chunks=(64,))
@@ -140,12 +139,11 @@ class ResultWriter:
         axis = make_scale(group, "x", np.asarray(x, dtype=np.float64), unit, definition)
         self._surface = Table(group, {"eta": SURFACE["eta"]}, axis)
 
-    def _create_tracks(self, grains: Grains) -> Table | None:
+    def _create_tracks(self) -> Table | None:
         if self._track_ids is None:
             return None
-        self._followed = GrainTracks(self._track_ids, grains)
         group = self._file.create_group("tracks")
-        return Table(group, TRACKS, make_scale(group, "grain", self._track_ids, "1", "number of the grain"))
+        return Table(group, TRACKS, make_scale(group, "grain", self._track_ids, "1", "id of the disc or ellipse"))
 
     def _create_stages(self) -> dict[str, Any]:
         """Columns over `stage`; the series row at its start and end as `before` and `after`, shape (stages, quantities)."""
@@ -210,7 +208,8 @@ class ResultWriter:
         """State of the followed grains; `grains` are all elements of the run. Nothing happens if none is followed."""
         if self._tracks is None:
             return
-        self._bytes += self._tracks.append(time, self._followed.row(grains))
+        row = [getattr(grains, name)[self._track_ids] for name in self._tracks.names]
+        self._bytes += self._tracks.append(time, row)
         with self._guard():
             self._flush_if_due()
 
