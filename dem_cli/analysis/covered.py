@@ -111,15 +111,19 @@ def _lens_of_cells(x, y, radius, body, k, m, x0, y0, x1, y1):  # type: ignore[no
     v0, v1 = max(y0, y[k] - radius[k], y[m] - radius[m]), min(y1, y[k] + radius[k], y[m] + radius[m])
     if u0 >= u1 or v0 >= v1:
         return 0.0
-    alone = True
     first_k, first_m = _first_of_grain(body, k), _first_of_grain(body, m)
     end_k, end_m = _end_of_grain(body, first_k), _end_of_grain(body, first_m)
+    # a lens whose chord runs between the centres lies in the circle about the chord
+    dx, dy = x[m] - x[k], y[m] - y[k]
+    dd = dx * dx + dy * dy
+    along = 0.5 + 0.5 * (radius[k] - radius[m]) * (radius[k] + radius[m]) / dd if dd > 0.0 else -1.0
+    alone = 0.0 <= along <= 1.0
+    half = math.sqrt(max(0.0, radius[k] ** 2 - along * along * dd))
     for first, end in ((first_k, end_k), (first_m, end_m)):
         for other in range(first, end):
-            if other not in (k, m):
-                dx = max(u0 - x[other], x[other] - u1, 0.0)
-                dy = max(v0 - y[other], y[other] - v1, 0.0)
-                alone = alone and dx * dx + dy * dy >= radius[other] ** 2
+            if alone and other not in (k, m):
+                ox, oy = x[k] + along * dx - x[other], y[k] + along * dy - y[other]
+                alone = ox * ox + oy * oy >= (radius[other] + half) ** 2
     if alone:
         return lens_in_rectangle(x[k], y[k], radius[k], x[m], y[m], radius[m], x0, y0, x1, y1)
     most = 4 + 2 * (end_k - first_k + end_m - first_m)
