@@ -1,6 +1,6 @@
 """Speed of the explicit engine for each shape of grain beside discs, in one process and in turn, so that their ratios are fair.
 
-3000 elements of the thesis (discs, ellipses of aspect ratio 2, 1500 bonded pairs, 1500 rigid pairs) fall and come to rest at damping ratio 0.3; then
+3000 elements of the thesis (discs, ellipses of aspect ratio 2, 1500 bonded pairs, 1500 rigid ones) come to rest at damping ratio 0.3; then
 they lie under gravity, and blocks of 2000 steps of each, with all measures every 1000 steps, are timed one after the other. Prints
 million element-steps per CPU second on one core. By hand, ten minutes:
 
