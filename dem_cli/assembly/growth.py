@@ -17,7 +17,10 @@ SMALL = 0.2  # share of the region that the grains cover when they begin to grow
 ATTEMPTS = 10000  # places that a small grain tries at the start
 GROW = 1.03  # factor of size from one relaxation to the next
 LOOSE = 0.3  # void ratio at which they reach their size; from there on the ceiling comes down
-FIRST, LAST = 0.01, 2e-3  # step of the ceiling as a share of its height, and the step at which the grains count as jammed
+FIRST, LAST = (
+    0.01,
+    2e-3,
+)  # step of the ceiling as a share of its height, and the step at which the grains count as jammed
 STEPS = 1500  # of a relaxation at most
 PART = 250  # steps between two chances to interrupt
 

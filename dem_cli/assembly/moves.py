@@ -11,22 +11,41 @@ import math
 import numpy as np
 
 from dem_cli.assembly.bodies import Bodies
-from dem_cli.assembly.overlap import PLACED, A, X, Y, cell_of, extents, is_free, link, link_all, place, place_all, unlink
+from dem_cli.assembly.overlap import (
+    PLACED,
+    X,
+    Y,
+    cell_of,
+    extents,
+    is_free,
+    link,
+    link_all,
+    place,
+    place_all,
+    unlink,
+)
 from dem_cli.assembly.region import Packed, Region, Tell
 from dem_cli.jit import kernel
 from dem_cli.state import Floats
 
 LIFT = 0.05  # l of the Metropolis rule, in mean radii
 ROOM = 1e-9  # share of their size that is kept between grains, against rounding
-LONGER, SHORTER = 1.1, 0.96  # a grain's own step after a move that was kept, and one that was not: 0.3 of them are in the long run
+LONGER, SHORTER = (
+    1.1,
+    0.96,
+)  # a grain's own step after a move that was kept, and one that was not: 0.3 of them are in the long run
 LONGEST, SHORTEST = 0.5, 1e-4  # steps in mean radii, turns in rad
 TRIALS = 100000  # between two looks at the ceiling and the step, at least one sweep
-STALLED = 2e-4  # the fill's middle sinks by less than this share of its height in LOOK sweeps: it will not get much denser
+STALLED = (
+    2e-4  # the fill's middle sinks by less than this share of its height in LOOK sweeps: it will not get much denser
+)
 LOOK = 100
 
 
 @kernel()
-def move(bodies, x, y, angle, width, ceiling, size, step, turn, lift, numbers, placed, cell, head, following, before, largest):
+def move(
+    bodies, x, y, angle, width, ceiling, size, step, turn, lift, numbers, placed, cell, head, following, before, largest
+):
     """One trial for each row of `numbers` (n, 5), uniform in 0..1: which grain, shift or turn, how far, whether up is kept.
 
     step, turn (g,): how far each grain moves, in `size` [m], and turns [rad]. They, x, y, angle, placed and the cells change in place.
@@ -77,7 +96,14 @@ def lattice(bodies: Bodies, width: float) -> tuple[Floats, Floats]:
 
 
 def shake_down(
-    bodies: Bodies, x: Floats, y: Floats, angle: Floats, region: Region, sweeps: int, rng: np.random.Generator, tell: Tell
+    bodies: Bodies,
+    x: Floats,
+    y: Floats,
+    angle: Floats,
+    region: Region,
+    sweeps: int,
+    rng: np.random.Generator,
+    tell: Tell,
 ) -> Packed:
     """Local moves from places that do not overlap, until all grains are below the region's height, or get no closer, or after `sweeps`
     trials a grain.
@@ -108,4 +134,3 @@ def shake_down(
                 break
             looked, middle = done, new
     return Packed(x, y, angle, ceiling)
-

@@ -78,8 +78,8 @@ def separate(one, i, two, j):
 def cell_of(x, y, cell, columns, rows):
     """Column and row of a point; points beyond the grid belong to its border."""
     return (
-        min(max(int(math.floor(x / cell)), 0), columns - 1),
-        min(max(int(math.floor(y / cell)), 0), rows - 1),
+        min(max(math.floor(x / cell), 0), columns - 1),
+        min(max(math.floor(y / cell), 0), rows - 1),
     )
 
 

@@ -16,7 +16,25 @@ ROOM = 1e-9  # share of the mean reach that is kept between neighbours, against 
 
 
 @kernel()
-def drop(bodies, order, done, tried, attempts, x, y, angle, width, height, numbers, placed, cell, head, following, before, largest):
+def drop(
+    bodies,
+    order,
+    done,
+    tried,
+    attempts,
+    x,
+    y,
+    angle,
+    width,
+    height,
+    numbers,
+    placed,
+    cell,
+    head,
+    following,
+    before,
+    largest,
+):
     """Drops the grains of `order` from number `done` on at the places of `numbers` (n, 2), uniform in 0..1.
 
     tried: places that the present grain has tried already. Returns (grains done, places tried by the next one); it stops
@@ -71,7 +89,7 @@ class Scatter:
         following, before = np.empty((2, bodies.count), dtype=np.int64)
         link_all(self.order[: self.done], self.x, self.y, cell, head, following, before)
         while self.done < bodies.count and tried < attempts:
-            self.tell(f"rejection: {self.done} of {bodies.count} grains placed")
+            self.tell(f"placing: {self.done} of {bodies.count} grains placed")
             self.done, tried = drop(
                 bodies, self.order, self.done, tried, attempts, self.x, self.y, self.angle, self.width, height,
                 self.rng.random((CHUNK, 2)), self.placed, cell, head, following, before, float(bodies.reach.max()),
@@ -79,7 +97,9 @@ class Scatter:
         return self.done == bodies.count
 
 
-def reject(bodies: Bodies, angle: Floats, region: Region, attempts: int, rng: np.random.Generator, tell: Tell) -> Packed:
+def reject(
+    bodies: Bodies, angle: Floats, region: Region, attempts: int, rng: np.random.Generator, tell: Tell
+) -> Packed:
     """Random sequential addition; angles stay as they are.
 
     Where a grain finds no place in `attempts` the ceiling is raised and the packing becomes looser. ScenarioError where it must not be.
