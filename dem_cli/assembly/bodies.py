@@ -61,14 +61,20 @@ class Bodies(NamedTuple):
         start = np.concatenate([[0], np.cumsum(many)])
         elements = np.repeat(self.start[grains] - start[:-1], many) + np.arange(start[-1])
         return Bodies(
-            start,
-            *(values[elements] for values in (self.ox, self.oy, self.turn, self.a, self.b)),
-            np.repeat(np.arange(len(grains)), many),
-            *(values[grains] for values in (self.reach, self.area, self.round)),
+            start=start,
+            ox=self.ox[elements],
+            oy=self.oy[elements],
+            turn=self.turn[elements],
+            a=self.a[elements],
+            b=self.b[elements],
+            owner=np.repeat(np.arange(len(grains)), many),
+            reach=self.reach[grains],
+            area=self.area[grains],
+            round=self.round[grains],
         )
 
     @property
-    def count(self) -> int:
+    def number(self) -> int:
         """Number of grains."""
         return len(self.reach)
 

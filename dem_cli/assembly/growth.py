@@ -31,7 +31,7 @@ class Pile:
     def __init__(self, bodies: Bodies, x: Floats, y: Floats, angle: Floats, width: float, height: float) -> None:
         self.bodies, self.width, self.height = bodies, width, height
         self.x, self.y, self.angle = x.copy(), y.copy(), angle.copy()
-        self.scale = np.ones(bodies.count)
+        self.scale = np.ones(bodies.number)
         self.steps = 0
         # An overlap of swollen grains below this is none of the grains themselves: each is smaller by SWELL * b on its side.
         self.tolerance = SWELL * float(bodies.b.min())
@@ -39,7 +39,7 @@ class Pile:
     def relax(self, tell: Tell, words: str) -> bool:
         """Whether all overlaps could be pushed out."""
         tolerance = self.tolerance * float(self.scale.min())
-        velocity, pace = np.zeros((self.bodies.count, 3)), np.zeros(3)
+        velocity, pace = np.zeros((self.bodies.number, 3)), np.zeros(3)
         for _ in range(STEPS // PART):
             tell(words)
             overlap, steps = relax(
@@ -61,7 +61,7 @@ class Pile:
     def raise_until_free(self, region: Region, tell: Tell, words: str, method: str) -> None:
         """Raises the ceiling until no overlap is left. ScenarioError where it must not go."""
         while not self.relax(tell, words):
-            self.lift(region.raised(self.bodies, self.height * (1.0 + FIRST), method))
+            self.lift(region.raised(self.height * (1.0 + FIRST), method))
 
     def lower(self, target: float, tell: Tell, words: str) -> None:
         """Lowers the ceiling to `target` [m], or until the grains are jammed below it."""
@@ -84,7 +84,7 @@ def grow(bodies: Bodies, angle: Floats, region: Region, rng: np.random.Generator
     size = min(math.sqrt(SMALL * region.width * height / bodies.solid), 1.0)
     scatter = Scatter(bodies.scaled(size), angle, region.width, rng, tell)
     while not scatter.fill(height, ATTEMPTS):
-        height = region.raised(bodies, height * (1.0 + FIRST), "growth")
+        height = region.raised(height * (1.0 + FIRST), "growth")
     pile = Pile(bodies, scatter.x, scatter.y, angle, region.width, height)
     while size < 1.0:
         size = min(size * GROW, 1.0)

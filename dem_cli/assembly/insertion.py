@@ -72,12 +72,12 @@ def choose(points, clearance, order, wanted):
 def widest_gaps(bodies: Bodies, pile: Pile, wanted: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Centres (up to wanted, 2) of the widest gaps between the grains of a pile, and their clearances [m]; at least one is found."""
     placed = np.zeros((len(bodies.a), PLACED))
-    place_all(bodies, pile.x, pile.y, pile.angle, np.ones(bodies.count), 0.0, placed)
+    place_all(bodies, pile.x, pile.y, pile.angle, np.ones(bodies.number), 0.0, placed)
     mean = float(bodies.reach.mean())
     cell = 2.0 * mean
     head = np.empty((int(pile.width / cell) + 1, int(pile.height / cell) + 1), dtype=np.int64)
-    following, before = np.empty((2, bodies.count), dtype=np.int64)
-    link_all(np.arange(bodies.count), pile.x, pile.y, cell, head, following, before)
+    following, before = np.empty((2, bodies.number), dtype=np.int64)
+    link_all(np.arange(bodies.number), pile.x, pile.y, cell, head, following, before)
     while True:
         points = rng.random((PROBES * wanted, 2)) * np.array([pile.width, pile.height])
         free = clearances(
@@ -96,12 +96,12 @@ def insert(
     """
     scatter, height = Scatter(bodies, angle, region.width, rng, tell), region.height
     while not scatter.fill(height, attempts) and scatter.done == 0:
-        height = region.raised(bodies, height * RAISE, "insertion")
+        height = region.raised(height * RAISE, "insertion")
     order, done = scatter.order, scatter.done
     x, y, angle = scatter.x.copy(), scatter.y.copy(), angle.copy()
-    while done < bodies.count:
+    while done < bodies.number:
         there = bodies.take(order[:done])
-        wanted = min(math.ceil(BATCH * done), bodies.count - done)
+        wanted = min(math.ceil(BATCH * done), bodies.number - done)
         pile = Pile(there, x[order[:done]], y[order[:done]], angle[order[:done]], region.width, height)
         points, free = widest_gaps(there, pile, wanted, rng)
         new = order[done : done + len(points)]
@@ -110,7 +110,7 @@ def insert(
         now = order[:done]
         pile = Pile(bodies.take(now), x[now], y[now], angle[now], region.width, height)
         scale = np.minimum(np.maximum(free / bodies.reach[new], SMALLEST), 1.0)
-        words = f"insertion: {done} of {bodies.count} grains placed"
+        words = f"insertion: {done} of {bodies.number} grains placed"
         while True:
             pile.scale[-len(new) :] = scale
             pile.raise_until_free(region, tell, words, "insertion")

@@ -90,7 +90,7 @@ def lattice(bodies: Bodies, width: float) -> tuple[Floats, Floats]:
     room = 2.0 * float(bodies.reach.max()) * (1.0 + 1e-6)
     columns = max(int((width - 0.5 * room) / room), 1)
     spacing = (width - (0.5 * room if columns > 1 or width >= 1.5 * room else 0.0)) / columns
-    row, column = np.divmod(np.arange(bodies.count), columns)
+    row, column = np.divmod(np.arange(bodies.number), columns)
     shift = 0.5 * room if columns > 1 or width >= 1.5 * room else 0.0
     return (column + 0.5) * spacing + (row % 2) * shift, (row + 0.5) * room
 
@@ -110,23 +110,23 @@ def shake_down(
     """
     x, y, angle = x.copy(), y.copy(), angle.copy()
     placed = np.zeros((len(bodies.a), PLACED))
-    place_all(bodies, x, y, angle, np.ones(bodies.count), ROOM, placed)
-    mean = math.sqrt(bodies.solid / (bodies.count * math.pi))
+    place_all(bodies, x, y, angle, np.ones(bodies.number), ROOM, placed)
+    mean = math.sqrt(bodies.solid / (bodies.number * math.pi))
     ceiling = max(float(extents(placed, 0, len(placed))[3]), 0.0)
     cell = 2.0 * float(bodies.reach.mean())
     head = np.empty((int(region.width / cell) + 1, int(ceiling / cell) + 1), dtype=np.int64)
-    following, before = np.empty((2, bodies.count), dtype=np.int64)
-    link_all(np.arange(bodies.count), x, y, cell, head, following, before)
-    step, turn = np.full((2, bodies.count), LONGEST)
+    following, before = np.empty((2, bodies.number), dtype=np.int64)
+    link_all(np.arange(bodies.number), x, y, cell, head, following, before)
+    step, turn = np.full((2, bodies.number), LONGEST)
     done, looked, middle = 0.0, 0.0, math.inf
     while ceiling > region.height and done < sweeps:
-        tell(f"local moves: sweep {done:.0f}, void ratio {region.void_ratio(bodies, ceiling):.3f}")
-        trials = max(min(TRIALS, 5 * bodies.count), 1)
+        tell(f"local moves: sweep {done:.0f}, void ratio {region.void_ratio(ceiling):.3f}")
+        trials = max(min(TRIALS, 5 * bodies.number), 1)
         move(
             bodies, x, y, angle, region.width, ceiling, mean, step, turn, LIFT * mean, rng.random((trials, 5)), placed,
             cell, head, following, before, float(bodies.reach.max()),
         )  # fmt: skip
-        done += trials / bodies.count
+        done += trials / bodies.number
         ceiling = max(region.height, float(extents(placed, 0, len(placed))[3]))
         if done >= looked + LOOK:
             new = float(bodies.area @ y) / bodies.solid

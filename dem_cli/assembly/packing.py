@@ -33,10 +33,10 @@ def place_grains(scenario: Scenario, generator: np.random.Generator, tell: Tell)
     bodies = bodies_of(scenario, sizes)
     region = region_of(scenario, bodies)
     packed = _pack(scenario, bodies, sizes.angle, region, generator, tell)
-    reached = region.void_ratio(bodies, packed.height)
+    reached = region.void_ratio(packed.height)
     tell(f"{packing.method}: void ratio {reached:.4g} over a height of {packed.height:.4g} m")
     grains, bonds = build_grains(scenario, replace(sizes, angle=packed.angle), packed.x, packed.y)
-    return grains, bonds, _warning(scenario, region.void_ratio(bodies, region.height), reached)
+    return grains, bonds, _warning(scenario, region.void_ratio(region.height), reached)
 
 
 def bodies_of(scenario: Scenario, sizes: Sizes) -> Bodies:
@@ -52,8 +52,8 @@ def region_of(scenario: Scenario, bodies: Bodies) -> Region:
     highest = container.height if container.lid and container.height is not None else math.inf
     height = scenario.packing.region_height(container.width, bodies.solid)
     by_us = scenario.packing.void_ratio is None and scenario.packing.height is None
-    region = Region(container.width, min(height, highest) if by_us else height, highest)
-    region.raised(bodies, region.height, scenario.packing.method)
+    region = Region(container.width, min(height, highest) if by_us else height, highest, bodies.solid)
+    region.raised(region.height, scenario.packing.method)
     return region
 
 
@@ -68,7 +68,7 @@ def _pack(
         return insert(bodies, angle, region, packing.attempts, generator, tell)
     if packing.method == "local-move":
         assert packing.sweeps is not None
-        x, y = _grid(scenario, bodies.count) if packing.grid else lattice(bodies, region.width)
+        x, y = _grid(scenario, bodies.number) if packing.grid else lattice(bodies, region.width)
         return shake_down(bodies, x, y, angle, region, packing.sweeps, generator, tell)
     assert packing.attempts is not None
     return reject(bodies, angle, region, packing.attempts, generator, tell)

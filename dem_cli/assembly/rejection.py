@@ -77,7 +77,7 @@ class Scatter:
     def __init__(self, bodies: Bodies, angle: Floats, width: float, rng: np.random.Generator, tell: Tell) -> None:
         self.bodies, self.angle, self.width, self.rng, self.tell = bodies, angle, width, rng, tell
         self.order = large_first(bodies)
-        self.x, self.y = np.zeros(bodies.count), np.zeros(bodies.count)
+        self.x, self.y = np.zeros(bodies.number), np.zeros(bodies.number)
         self.placed = np.zeros((len(bodies.a), PLACED))
         self.done = 0
 
@@ -86,15 +86,15 @@ class Scatter:
         bodies, tried = self.bodies, 0
         cell = 2.0 * float(bodies.reach.mean())
         head = np.empty((int(self.width / cell) + 1, int(height / cell) + 1), dtype=np.int64)
-        following, before = np.empty((2, bodies.count), dtype=np.int64)
+        following, before = np.empty((2, bodies.number), dtype=np.int64)
         link_all(self.order[: self.done], self.x, self.y, cell, head, following, before)
-        while self.done < bodies.count and tried < attempts:
-            self.tell(f"placing: {self.done} of {bodies.count} grains placed")
+        while self.done < bodies.number and tried < attempts:
+            self.tell(f"placing: {self.done} of {bodies.number} grains placed")
             self.done, tried = drop(
                 bodies, self.order, self.done, tried, attempts, self.x, self.y, self.angle, self.width, height,
                 self.rng.random((CHUNK, 2)), self.placed, cell, head, following, before, float(bodies.reach.max()),
             )  # fmt: skip
-        return self.done == bodies.count
+        return self.done == bodies.number
 
 
 def reject(
@@ -106,5 +106,5 @@ def reject(
     """
     scatter, height = Scatter(bodies, angle, region.width, rng, tell), region.height
     while not scatter.fill(height, attempts):
-        height = region.raised(bodies, max(height * RAISE, height + 0.1 * float(bodies.reach.mean())), "rejection")
+        height = region.raised(max(height * RAISE, height + 0.1 * float(bodies.reach.mean())), "rejection")
     return Packed(scatter.x, scatter.y, angle, height)

@@ -18,7 +18,7 @@ from dem_cli.state import Floats
 RATE_GRAIN_STEPS = {"disc": 40e6, "ellipse": 12e6, "bonded": 24e6, "clump": 24e6}
 SERIES_COLUMNS = 46  # numbers of a row of /series, 8 bytes each
 # Seconds that a packing takes, a grain: discs, and by how much other shapes take longer. Measured with 500 and 3000 grains; a guess for others.
-PACKING_SECONDS = {"falling": 1e-5, "rejection": 1e-5, "local-move": 1.5e-3, "growth": 2.5e-3, "insertion": 1.5e-3}
+PACKING_SECONDS = {"falling": 1e-5, "rejection": 1e-5, "local-move": 2e-3, "growth": 1.5e-3, "insertion": 6e-4}
 PACKING_FACTOR = {"disc": 1.0, "ellipse": 5.0, "bonded": 2.5, "clump": 2.5}
 LOOSE_SETTLING, DENSE_SETTLING = 0.6, 0.3  # s, until packings are at rest that begin loose, or dense
 POROSITY = 0.18  # of a bed that has fallen into place; for estimates only
