@@ -34,7 +34,7 @@ LONGER, SHORTER = (
     1.1,
     0.96,
 )  # a grain's own step after a move that was kept, and one that was not: 0.3 of them are in the long run
-LONGEST, SHORTEST = 0.5, 1e-4  # steps in mean radii, turns in rad
+LONGEST, WIDEST, SHORTEST = 2.0, 0.5, 1e-4  # steps in mean radii, turns in rad
 TRIALS = 100000  # between two looks at the ceiling and the step, at least one sweep
 STALLED = (
     2e-4  # the fill's middle sinks by less than this share of its height in LOOK sweeps: it will not get much denser
@@ -72,8 +72,8 @@ def move(
         left, right, bottom, top = extents(trial, 0, end - first)
         inside = left >= 0.0 and right <= width and bottom >= 0.0 and top <= ceiling
         free = inside and is_free(bodies, k, trial, tx, ty, x, y, placed, cell, head, following, largest)
-        pace = turn if turning else step
-        pace[k] = min(max(pace[k] * (LONGER if free else SHORTER), SHORTEST), LONGEST)
+        pace, most = (turn, WIDEST) if turning else (step, LONGEST)
+        pace[k] = min(max(pace[k] * (LONGER if free else SHORTER), SHORTEST), most)
         if not free:
             continue
         column, row = cell_of(x[k], y[k], cell, head.shape[0], head.shape[1])
@@ -117,7 +117,7 @@ def shake_down(
     head = np.empty((int(region.width / cell) + 1, int(ceiling / cell) + 1), dtype=np.int64)
     following, before = np.empty((2, bodies.number), dtype=np.int64)
     link_all(np.arange(bodies.number), x, y, cell, head, following, before)
-    step, turn = np.full((2, bodies.number), LONGEST)
+    step, turn = np.full((2, bodies.number), WIDEST)
     done, looked, middle = 0.0, 0.0, math.inf
     while ceiling > region.height and done < sweeps:
         tell(f"local moves: sweep {done:.0f}, void ratio {region.void_ratio(ceiling):.3f}")

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from dem_cli.geometry.ellipse import outline, widest_gap
+from dem_cli.geometry.ellipse import gap_slopes, outline, widest_gap
 from dem_cli.jit import kernel
 
 X, Y, M, P, Q, A = range(6)
@@ -65,12 +65,25 @@ def separate(one, i, two, j):
     inner = math.sqrt(max(mi - math.hypot(pi, qi), 0.0)) + math.sqrt(max(mj - math.hypot(pj, qj), 0.0))
     if square <= inner * inner:
         return False
-    # The gap in any direction is a lower bound.
+    # The gap f(n) as a function of vectors n of any length is concave, so f(w) <= grad f(n).w. A direction w that separates the two lies within
+    # acos(inner / distance) of the line of centres: where grad f(n).w <= 0 at both ends of that fan there is none.
     distance = math.sqrt(square)
-    nx, ny = dx / distance, dy / distance
-    c, s = nx * nx - ny * ny, 2.0 * nx * ny
-    if distance > math.sqrt(mi + pi * c + qi * s) + math.sqrt(mj + pj * c + qj * s):
-        return True
+    cx, cy = dx / distance, dy / distance
+    along, aside = inner / distance, math.sqrt(max(1.0 - inner * inner / square, 0.0))
+    nx, ny = cx, cy
+    for _ in range(8):
+        g, g1, g2 = gap_slopes(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny)
+        if g >= 0.0:
+            return True
+        fx, fy = g * nx - g1 * ny, g * ny + g1 * nx
+        middle, across = along * (fx * cx + fy * cy), aside * (fy * cx - fx * cy)
+        if middle + across <= 0.0 and middle - across <= 0.0:
+            return False
+        if g2 >= 0.0:
+            break
+        turn = min(max(-g1 / g2, -0.5), 0.5)
+        length = math.sqrt(1.0 + turn * turn)
+        nx, ny = (nx - turn * ny) / length, (ny + turn * nx) / length
     return widest_gap(dx, dy, mi, pi, qi, mj, pj, qj, 0.0, 0.0)[2] >= 0.0
 
 

@@ -71,7 +71,7 @@ def _pack(
         x, y = _grid(scenario, bodies.number) if packing.grid else lattice(bodies, region.width)
         return shake_down(bodies, x, y, angle, region, packing.sweeps, generator, tell)
     assert packing.attempts is not None
-    return reject(bodies, angle, region, packing.attempts, generator, tell)
+    return reject(bodies, angle, region, packing.attempts, generator, tell, packing.method)
 
 
 def _warning(scenario: Scenario, wanted: float, reached: float) -> str:

@@ -98,13 +98,19 @@ class Scatter:
 
 
 def reject(
-    bodies: Bodies, angle: Floats, region: Region, attempts: int, rng: np.random.Generator, tell: Tell
+    bodies: Bodies,
+    angle: Floats,
+    region: Region,
+    attempts: int,
+    rng: np.random.Generator,
+    tell: Tell,
+    method: str = "rejection",
 ) -> Packed:
-    """Random sequential addition; angles stay as they are.
+    """Random sequential addition; angles stay as they are. method: its name in messages.
 
     Where a grain finds no place in `attempts` the ceiling is raised and the packing becomes looser. ScenarioError where it must not be.
     """
     scatter, height = Scatter(bodies, angle, region.width, rng, tell), region.height
     while not scatter.fill(height, attempts):
-        height = region.raised(max(height * RAISE, height + 0.1 * float(bodies.reach.mean())), "rejection")
+        height = region.raised(max(height * RAISE, height + 0.1 * float(bodies.reach.mean())), method)
     return Packed(scatter.x, scatter.y, angle, height)

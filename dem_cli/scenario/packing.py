@@ -77,7 +77,9 @@ class Packing(Table):
     )
     height: Length | None = key(None, "height that is filled, in place of void_ratio", example="30 cm")
     attempts: Annotated[int, Whole(ge=1)] | None = key(
-        maker=lambda good: 1000 if good["method"] in METHODS_OF["attempts"] and not (good["grid"] or good["file"]) else None,
+        maker=lambda good: (
+            1000 if good["method"] in METHODS_OF["attempts"] and not (good["grid"] or good["file"]) else None
+        ),
         doc="rejection, insertion, falling from random places: places that a grain tries (default: 1000)",
         example=1000,
     )

@@ -241,7 +241,7 @@ def test_moves_sink_as_heavy_grains_do(lift: float, sinks: bool) -> None:
         assert step[0] < 0.01  # only small moves are kept at the floor
     else:
         assert np.ptp(heights) > 40.0
-        assert step[0] == 0.5
+        assert step[0] == 2.0
     assert angle[0] == 0.0
     assert placed[0, :2].tolist() == [x[0], y[0]]
 
