@@ -39,7 +39,14 @@ def test_comes_to_rest_and_stays_there(method: str, tmp_path: Path) -> None:
         # The mean force swings about its limit when rest is declared; the swing dies out, and no vibration goes on.
         assert np.max(series["unbalanced"][after][-10:]) < 1e-4
         assert np.max(series["kinetic"][after]) / 120 < 1e-6 * weight
-        assert series["kinetic"][-1] <= 0.5 * series["kinetic"][after][0] + 1e-12 * weight
+        # A disc on a single contact may roll for long, there is no rolling friction; all others are a hundred times stiller than rest asks for.
+        frame = results.frame(-1)
+        assert frame.contacts is not None
+        both = np.concatenate([frame.contacts.i, frame.contacts.j[frame.contacts.j >= 0]])
+        held = np.bincount(both, minlength=120) > 1
+        energy = 0.5 * grains.mass * (grains.vx**2 + grains.vy**2) + 0.5 * grains.inertia * grains.spin**2
+        assert np.count_nonzero(held) > 100
+        assert np.mean(energy[held]) < 1e-8 * weight
         assert 2.5 < series["coordination"][-1] < 4.5
         assert 0.15 < series["void_ratio"][-1] < 0.33
 
