@@ -246,6 +246,25 @@ def test_moves_sink_as_heavy_grains_do(lift: float, sinks: bool) -> None:
     assert placed[0, :2].tolist() == [x[0], y[0]]
 
 
+def test_height_of_a_grain_in_a_heat_bath() -> None:
+    """Metropolis: heights above the floor are distributed as exp(-y / l), so their mean and standard deviation are l."""
+    bodies, lift = ellipses([1.0], [1.0]), 20.0
+    x, y, angle = np.array([5.0]), np.array([21.0]), np.array([0.0])
+    placed = placed_at(bodies, list(x), list(y), list(angle))
+    head, following, before = np.full((6, 201), -1, dtype=np.int64), np.array([-1]), np.array([-1])
+    link_all(np.arange(1), x, y, 2.0, head, following, before)
+    rng, heights = np.random.default_rng(2), []
+    step, turn = np.full((2, 1), 2.0)
+    for _ in range(20000):
+        move(
+            bodies, x, y, angle, 10.0, 400.0, 2.0, step, turn, lift, rng.random((20, 5)), placed, 2.0,
+            head, following, before, 1.0,
+        )  # fmt: skip
+        heights.append(y[0] - 1.0)
+    assert np.mean(heights) == pytest.approx(lift, rel=0.15)
+    assert np.std(heights) == pytest.approx(lift, rel=0.2)
+
+
 @pytest.mark.parametrize("width", [2.1, 2.9, 3.2, 7.0, 40.0])
 def test_lattice_fits_between_the_walls(width: float) -> None:
     bodies = ellipses([1.0] * 30, [1.0] * 30)
