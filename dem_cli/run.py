@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,13 +23,27 @@ from dem_cli.state import Frame
 Listener = Callable[[Frame, Mapping[str, float] | None], None]
 
 
-def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, listener: Listener | None = None) -> Path:
-    """Run a scenario and write its result file `target`; returns the file's path.
+def run_scenario(
+    scenario: Scenario,
+    target: Path,
+    *,
+    force: bool = False,
+    listener: Listener | None = None,
+    packing_listener: Callable[[str], None] | None = None,
+) -> Path:
+    """Run a scenario and write its result file `target`; returns the file's path. packing_listener: told what the packing is at.
 
     ResultsError if the file exists and `force` is not given, ScenarioError if the scenario cannot be run, RunError if the run blows up; after
     that, and after Ctrl-C, what was written stays readable under the partial name (`results.partial_path`).
     """
-    assembly = build_assembly(scenario)
+    with marked_interrupts() as check:
+
+        def tell(words: str) -> None:
+            check()
+            if packing_listener:
+                packing_listener(words)
+
+        assembly = build_assembly(scenario, tell)
     engine = ExplicitEngine(scenario, assembly)
     output, container = scenario.output, scenario.container
     surface_x = bin_centers(container.width, output.surface_bins)
@@ -45,6 +60,8 @@ def run_scenario(scenario: Scenario, target: Path, *, force: bool = False, liste
         row: dict[str, float] | None = None
         try:
             for frame in engine.frames():
+                if frame.step == 0 and frame.stage_start:
+                    frame = replace(frame, warnings=(*assembly.warnings, *frame.warnings))
                 measures = measure(scenario, frame) if frame.due & {"series", "frames"} else None
                 row = series_row(frame, measures) if measures else row
                 write(writer, scenario, frame, measures, row)

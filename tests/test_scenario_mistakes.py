@@ -45,7 +45,7 @@ ONE_LINE: list[tuple[dict[str, Any], list[str]]] = [
     ),
     ({"grains.count": ABSENT}, ["[grains] count: is missing. Add for example count = 3000"]),
     ({"grains.radius": ABSENT}, ["[grains] radius: is missing. Add for example radius = "]),
-    ({"packing.grid": ABSENT}, ["[packing] grid: is missing. Give one of: grid or file"]),
+    ({"packing": {"method": "file"}}, ['[packing] file: is missing. Add for example file = "grains.csv"']),
     ({"stage": ABSENT}, ["a.toml: stage: is missing. Add [[stage]]"]),
     ({"stage": []}, ["stage = []: is empty. Add at least one stage"]),
     ({"stage.0.kind": ABSENT}, ["[[stage]] 1 kind: is missing. Write kind = one of settle, shake, run"]),
@@ -104,7 +104,41 @@ ONE_LINE: list[tuple[dict[str, Any], list[str]]] = [
     ),
     ({"material.normal_stiffness": "1 N/m"}, ["[material] normal_stiffness", "contradicts s_wave_velocity"]),
     ({"packing.file": "a.csv"}, ["[packing] file", "contradicts grid"]),
-    ({"packing.method": "file"}, ['[packing] grid = { columns = 8, spacing = "3 cm" }: contradicts method = "file"']),
+    (
+        {"packing.method": "growth"},
+        [
+            '[packing] grid = { columns = 8, spacing = "3 cm" }: is no key of method = "growth". ',
+            'Leave it out, or write method = "falling" or "local-move"',
+        ],
+    ),
+    (
+        {"packing": {"method": "growth", "attempts": 5}},
+        [
+            '[packing] attempts = 5: is no key of method = "growth". Leave it out, or write method = "falling" or "rejection"'
+        ],
+    ),
+    (
+        {"packing": {"method": "insertion", "sweeps": 5}},
+        ['[packing] sweeps = 5: is no key of method = "insertion". Leave it out, or write method = "local-move"'],
+    ),
+    (
+        {"packing": {"method": "rejection", "void_ratio": 1.5, "height": "30 cm"}},
+        ['[packing] height = "30 cm": contradicts void_ratio. Give only one of: void_ratio or height'],
+    ),
+    (
+        {"packing.void_ratio": 0.25},
+        ["[packing] void_ratio = 0.25: contradicts grid, which says where the grains start"],
+    ),
+    ({"packing": {"method": "growth", "void_ratio": 0}}, ["[packing] void_ratio = 0: is out of range"]),
+    ({"packing": {"method": "grwth"}}, ['[packing] method = "grwth": must be one of falling, ', '"growth"?']),
+    (
+        {"packing": {"method": "growth"}, "container.width": "19 mm"},
+        ['[container] width = "19 mm": is narrower than the largest grain, which is up to 0.02 m across. Widen it'],
+    ),
+    (
+        {"packing": {"method": "growth", "height": "1 m"}, "container.height": "50 cm", "container.lid": True},
+        ['[packing] height = "1 m": is above the lid, which is at 0.5 m'],
+    ),
     (
         {"grains.radius": {"fixed": "7 mm", "uniform": ["5 mm", "7 mm"]}},
         ["[grains] radius.uniform", "contradicts fixed"],

@@ -20,6 +20,7 @@ SMALLER = (
     "output.tracks.grains=[0, 150, 299]",
 )
 SHORTER = {
+    "packings": (),
     "shake-quick": (),
     "shake-record": ("stage.shake.duration=0.9 s",),
     "thesis-discs-400gal-10hz": (*SMALLER, "stage.shake.duration=0.5 s"),
@@ -65,11 +66,14 @@ def test_ledger_closes(results: Results) -> None:
 
 def test_packs_and_densifies(results: Results) -> None:
     """What the thesis sees: falling leaves a dense sample, shaking does not loosen it at 400 gal; none is lost."""
-    packing, shaking = results.stages[0], results.stages[1]
+    packing = results.stages[0]
     assert 0.17 < packing.after["void_ratio_inner"] < 0.26
     assert 2.5 < packing.after["coordination"] < 4.2
     assert results.series["escaped"].max() == 0.0
     assert results.series["max_overlap"].max() < 0.05
+    if len(results.stages) == 1:
+        return
+    shaking = results.stages[1]
     stages = parse_scenario(str(results.attrs["resolved"]), folder=folder()).stages
     shake = next(s for s in stages if isinstance(s, Shake))
     if (shake.amplitude or (shake.record and shake.record.peak) or 0.0) < 5.0:

@@ -62,6 +62,7 @@ def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
             "  expected fill",
             f"depth {human(d.depth_expected, 'm')}, overlap at the floor {d.overlap_expected:.1e} of a radius",
         ),
+        *packing_rows(scenario, d),
         ("wave speeds", f"Vp {d.vp:.2f} m/s, Vs {d.vs:.2f} m/s"),
         ("stiffness", f"kn {d.kn:.4e} N/m, ks {d.ks:.4e} N/m"),
         (
@@ -90,6 +91,19 @@ def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
             f"{clock(d.run_seconds)} at {RATE_GRAIN_STEPS[d.shape] / 1e6:.0f} million grain-steps per second (one core)",
         ),
     ]
+
+
+def packing_rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
+    """Label and text of the line on the packing, where it takes some doing."""
+    packing = scenario.packing
+    if not packing.random:
+        return []
+    filled = "as dense as it gets"
+    if d.packing_height is not None:
+        solid = d.total_mass / (scenario.grains.density * scenario.depth)
+        void_ratio = scenario.container.width * d.packing_height / solid - 1.0
+        filled = f"void ratio {void_ratio:.4g} over a height of {human(d.packing_height, 'm')}"
+    return [("packing", f"{packing.method}: {filled}, takes {clock(d.packing_seconds)}")]
 
 
 def grain_rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:

@@ -10,12 +10,17 @@ from typing import Any
 import numpy as np
 
 from dem_cli.scenario import Scenario, Settle, Shake
+from dem_cli.scenario.packing import USUAL
 from dem_cli.scenario.restitution import restitution
 from dem_cli.state import Floats
 
 # Discs or ellipses times steps a second, by shape: one core; a usual run with output, see the benchmark in README.
 RATE_GRAIN_STEPS = {"disc": 40e6, "ellipse": 12e6, "bonded": 24e6, "clump": 24e6}
 SERIES_COLUMNS = 46  # numbers of a row of /series, 8 bytes each
+# Seconds that a packing takes, a grain: discs, and by how much other shapes take longer. Measured with 500 and 3000 grains; a guess for others.
+PACKING_SECONDS = {"falling": 1e-5, "rejection": 1e-5, "local-move": 2e-3, "growth": 1.5e-3, "insertion": 6e-4}
+PACKING_FACTOR = {"disc": 1.0, "ellipse": 5.0, "bonded": 2.5, "clump": 2.5}
+LOOSE_SETTLING, DENSE_SETTLING = 0.6, 0.3  # s, until packings are at rest that begin loose, or dense
 POROSITY = 0.18  # of a bed that has fallen into place; for estimates only
 Spread = tuple[float, float, float]  # smallest, mean, largest
 
@@ -60,6 +65,8 @@ class Derived:
     bond_rolling: Spread | None
     bond_lambda: Spread | None
     bond_creep: float | None
+    packing_height: float | None
+    packing_seconds: float
     vp: float
     vs: float
     kn: float
@@ -84,10 +91,10 @@ class Derived:
 
 def derive(scenario: Scenario) -> Derived:
     """All derived numbers. ScenarioError if the given time step is beyond the stability limit."""
-    from dem_cli.assembly import build_assembly
+    from dem_cli.assembly import build_loose
     from dem_cli.engines.explicit.timestep import choose_time_step, thesis_time_step
 
-    assembly = build_assembly(scenario)
+    assembly = build_loose(scenario)
     elements, bonds = assembly.grains, assembly.bonds
     radius, mass = elements.radius, np.bincount(elements.body, elements.mass).astype(float)
     lightest = float(elements.mass.min())
@@ -122,6 +129,8 @@ def derive(scenario: Scenario) -> Derived:
         bond_rolling=_spread(bonds.rolling) if len(bonds) else None,
         bond_lambda=_spread(bonds.normal * dt / reduced) if len(bonds) else None,
         bond_creep=creep,
+        packing_height=_packing_height(scenario, float(mass.sum())),
+        packing_seconds=_packing_seconds(scenario, len(mass)),
         vp=vp,
         vs=vs,
         kn=kn,
@@ -176,12 +185,28 @@ def _plan(scenario: Scenario, dt: float) -> list[StagePlan]:
     return plans
 
 
+def _packing_height(scenario: Scenario, mass: float) -> float | None:
+    """Height [m] that the packing is to fill; None where a grid or file says where grains are, or it is as low as can be."""
+    packing = scenario.packing
+    wanted = packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
+    return wanted if packing.random and (packing.height or packing.void_ratio or USUAL[packing.method]) else None
+
+
+def _packing_seconds(scenario: Scenario, grains: int) -> float:
+    """Time that the packing itself takes [s], a guess."""
+    if not scenario.packing.random:
+        return 0.0
+    return grains * PACKING_SECONDS[scenario.packing.method] * PACKING_FACTOR[scenario.grains.shape]
+
+
 def _settling_time(scenario: Scenario, *, first: bool) -> float:
     """A guess [s]: the fall from the top of the starting grid and 0.4 s to come to rest; 0.2 s for a bed that lies already.
 
     Seen in the shipped scenarios: 0.3 s after the fall with 500 grains, 0.4 s with 3000; 0.2 s after shaking.
     """
     grid, gravity = scenario.packing.grid, scenario.container.gravity
+    if first and gravity > 0.0 and scenario.packing.random:
+        return LOOSE_SETTLING if scenario.packing.method in ("falling", "rejection") else DENSE_SETTLING
     if not first or grid is None or gravity == 0.0:
         return 0.2
     return math.sqrt(2.0 * grid.rows(scenario.grain_count) * grid.row_spacing / gravity) + 0.4

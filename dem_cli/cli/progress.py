@@ -12,6 +12,7 @@ from dem_cli.scenario import Scenario
 from dem_cli.state import Frame
 
 LOG_EVERY = 10.0  # s of wall time between two lines in a log
+PACKING_EVERY = 1.0  # s that a packing takes until it is shown, and between two lines of it in a log
 DRAW_EVERY = 0.2  # s between two updates of the bar
 SPEED_OVER = 10.0  # s of wall time that the speed is an average of
 
@@ -22,7 +23,7 @@ class Progress:
     def __init__(self, scenario: Scenario, verbosity: int = 0) -> None:
         self.scenario = scenario
         self.silent = verbosity < 0
-        self._shown = time.monotonic()
+        self._began = self._shown = time.monotonic()
         self._stage_began = 0.0
         self._marks: deque[tuple[float, int]] = deque()  # wall time and step of late frames
         self._row: Mapping[str, float] | None = None
@@ -53,6 +54,18 @@ class Progress:
             self._bar.console.print(text, markup=False, highlight=False)
         else:
             print(text, file=sys.stderr, flush=True)
+
+    def packing(self, words: str) -> None:
+        """Told what the packing is at; shown once it has taken a second, and then as often as a run is."""
+        now = time.monotonic()
+        if self.silent or now - self._shown < (DRAW_EVERY if self._bar else PACKING_EVERY):
+            return
+        if now - self._began > PACKING_EVERY:
+            self._shown = now
+            if self._bar:
+                self._bar.update(self._task, description="packing", words=words)
+            else:
+                self.say(f"[packing] {words}")
 
     def __call__(self, frame: Frame, row: Mapping[str, float] | None) -> None:
         self._row = row or self._row

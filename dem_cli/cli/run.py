@@ -43,7 +43,7 @@ def command(
         if is_cold():
             progress.say("compiling the kernels, once after installation: up to a minute")
         try:
-            run_scenario(loaded, target, force=force, listener=progress)
+            run_scenario(loaded, target, force=force, listener=progress, packing_listener=progress.packing)
         except KeyboardInterrupt:
             progress.say(f"interrupted; what was written is in {partial_path(target)}")
             raise SystemExit(INTERRUPTED) from None

@@ -12,10 +12,11 @@ from pydantic import PrivateAttr
 
 from dem_cli.scenario.extent import largest_reach
 from dem_cli.scenario.grain_file import GrainFile, read_grain_file
+from dem_cli.scenario.packing import Packing
 from dem_cli.scenario.quantities import Length, Whole
 from dem_cli.scenario.stages import Stage
 from dem_cli.scenario.table import Given, Mistake, Table, key
-from dem_cli.scenario.tables import Contact, Container, Grains, Integration, Material, Output, Packing
+from dem_cli.scenario.tables import Contact, Container, Grains, Integration, Material, Output
 
 
 class Scenario(Table):
@@ -68,6 +69,8 @@ class Scenario(Table):
             yield Mistake(("contact", "ellipse_test"), rule, 'Leave it out, or write shape = "ellipse"')
         if packing and packing.grid and container:
             yield from _grid_fits(grains, packing, container)
+        elif packing and packing.random and grains and grains.radius and container:
+            yield from _region_fits(grains, packing, container)
         output = good.get("output")
         if grains and packing and output and output.tracks and not packing.file:
             yield from tracked_exist(output, _count(grains) * grains.elements)
@@ -189,6 +192,17 @@ def _grid_fits(grains: Grains | None, packing: Packing, container: Container) ->
         if top > container.height * (1.0 + 1e-9):
             rule = f"is below the starting grid, which is {top:.6g} m high"
             yield Mistake(("container", "height"), rule, "Raise the lid, or take more columns")
+
+
+def _region_fits(grains: Grains, packing: Packing, container: Container) -> Iterator[Mistake]:
+    """The largest grain has room between the walls, and the height to be filled is below the lid."""
+    across = 2.0 * largest_reach(grains)[0]
+    if across > container.width:
+        rule = f"is narrower than the largest grain, which is up to {across:.6g} m across"
+        yield Mistake(("container", "width"), rule, "Widen it")
+    if packing.height and container.lid and container.height and packing.height > container.height:
+        rule = f"is above the lid, which is at {container.height:g} m"
+        yield Mistake(("packing", "height"), rule, "Raise the lid, or take a smaller height")
 
 
 def tracked_exist(output: Output, count: int) -> Iterator[Mistake]:

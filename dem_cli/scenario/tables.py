@@ -1,4 +1,4 @@
-"""Tables of a scenario: grains, material, contact, container, packing, integration, output."""
+"""Tables of a scenario: grains, material, contact, container, integration, output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from dem_cli.scenario.quantities import (
     Acceleration,
     Angle,
     Density,
-    Distance,
     Duration,
     JsonSchema,
     Length,
@@ -256,52 +255,6 @@ class Container(Table):
         raw, good = given
         if good.get("lid") and "height" not in raw:
             yield Mistake(("lid",), "needs to know where the lid is", 'Add for example height = "1 m"')
-
-
-class Grid(Table):
-    """Staggered starting grid: rows of `columns` places, every second row shifted, filled from the bottom left."""
-
-    columns: Annotated[int, Whole(ge=1)] = key(doc="places in a row", example=40)
-    spacing: Length = key(doc="distance between the centres of a row", example="3 cm")
-    shift: Distance = key(
-        maker=lambda good: f"{good['spacing'] / 2.0!r} m",
-        doc="shift of every second row (default: half of spacing)",
-        example="1.5 cm",
-    )
-    row_spacing: Length = key(
-        maker=lambda good: f"{good['spacing']!r} m", doc="distance between rows (default: spacing)", example="3 cm"
-    )
-
-    def rows(self, count: int) -> int:
-        """Rows that `count` grains take up."""
-        return -(-count // self.columns)
-
-
-class Packing(Table):
-    """Where the grains are at the start."""
-
-    method: Literal["falling", "file"] = key(
-        doc="falling: they start apart, from a grid or a file, and fall; file: they lie as the file says",
-        example="falling",
-    )
-    grid: Grid | None = key(None, "starting grid", example={"columns": 40, "spacing": "3 cm"})
-    file: str | None = key(
-        None,
-        "CSV file beside the scenario, a grain a line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), "
-        "angle (degrees), spin (rad/s) and, for ellipses, aspect (a/b) may follow",
-        example="grains.csv",
-    )
-    file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")
-
-    alternatives: ClassVar = ((("grid",), ("file",)),)
-
-    @classmethod
-    def rules(cls, given: Given) -> Iterator[Mistake]:
-        raw, good = given
-        if good.get("method") == "file" and "grid" in raw and "file" not in raw:
-            yield Mistake(
-                ("grid",), 'contradicts method = "file"', 'Write file = "NAME.csv" in its place, or method = "falling"'
-            )
 
 
 class Integration(Table):
