@@ -13,7 +13,7 @@ from dem_cli.assembly.insertion import insert
 from dem_cli.assembly.moves import lattice, shake_down
 from dem_cli.assembly.region import Packed, Region, Tell
 from dem_cli.assembly.rejection import reject
-from dem_cli.assembly.shapes import Sizes, build_grains, draw_sizes
+from dem_cli.assembly.shapes import Sizes, build_grains, draw_sizes, stored_grains
 from dem_cli.scenario import Scenario
 from dem_cli.state import Bonds, Floats, Grains
 
@@ -24,9 +24,12 @@ def place_grains(scenario: Scenario, generator: np.random.Generator, tell: Tell)
     """The grains of a scenario before the first step, and their bonds, at rest unless their file gives velocities; and a warning, or
     an empty text.
     """
-    packing, sizes = scenario.packing, draw_sizes(scenario, generator)
-    if packing.file:
-        file = scenario.grain_file()
+    packing = scenario.packing
+    file = scenario.grain_file() if packing.file else None
+    if file and file.stored:
+        return *stored_grains(scenario, file.stored), ""
+    sizes = draw_sizes(scenario, generator)
+    if file:
         return *build_grains(scenario, sizes, file.x, file.y, file.vx, file.vy, file.spin), ""
     if not packing.random:
         return *build_grains(scenario, sizes, *_grid(scenario, len(sizes))), ""

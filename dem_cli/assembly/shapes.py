@@ -8,6 +8,7 @@ import numpy as np
 
 from dem_cli.geometry.union import pieces
 from dem_cli.scenario import Scenario
+from dem_cli.scenario.stored_grains import StoredGrains
 from dem_cli.state import Bonds, Floats, Grains
 
 STIFF = 1e5  # a viscosity called "stiff", in sqrt(m kn) of the lighter disc
@@ -115,6 +116,22 @@ def build_grains(
         body=of,
     )
     return grains, _bonds(scenario, grains, many) if scenario.grains.bond else Bonds.none()
+
+
+def stored_grains(scenario: Scenario, stored: StoredGrains) -> tuple[Grains, Bonds]:
+    """Elements as a result file holds them, with the masses and bonds that the scenario asks for."""
+    density, depth = scenario.grains.density, scenario.depth
+    grains = Grains.ellipses(stored.x, stored.y, stored.a, stored.b, stored.angle, density, depth)
+    grains = replace(grains, vx=stored.vx, vy=stored.vy, spin=stored.spin, body=stored.body)
+    if not scenario.grains.template:
+        return grains, Bonds.none()
+    body, number = body_of(scenario), grains.grain_count
+    grains = replace(
+        grains,
+        mass=grains.mass * np.tile(body.mass, number),
+        inertia=grains.inertia * np.tile(body.inertia, number),
+    )
+    return grains, _bonds(scenario, grains, len(body.x)) if scenario.grains.bond else Bonds.none()
 
 
 def _bonds(scenario: Scenario, grains: Grains, many: int) -> Bonds:

@@ -188,8 +188,9 @@ def _plan(scenario: Scenario, dt: float) -> list[StagePlan]:
 def _packing_height(scenario: Scenario, mass: float) -> float | None:
     """Height [m] that the packing is to fill; None where a grid or file says where grains are, or it is as low as can be."""
     packing = scenario.packing
-    wanted = packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
-    return wanted if packing.random and (packing.height or packing.void_ratio or USUAL[packing.method]) else None
+    if not packing.random or not (packing.height or packing.void_ratio or USUAL[packing.method]):
+        return None
+    return packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
 
 
 def _packing_seconds(scenario: Scenario, grains: int) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dem_cli.errors import ScenarioError
+from dem_cli.scenario.stored_grains import StoredGrains, is_result_file, read_stored_grains
 
 Floats = npt.NDArray[np.float64]
 SCALE = {"m": 1.0, "cm": 0.01, "mm": 0.001}
@@ -22,7 +23,8 @@ COLUMNS = (*LENGTHS, "angle", "aspect", "spin")
 class GrainFile:
     """The grains of a file, shape (n,) each: centres of mass x, y [m], radii [m], velocities vx, vy [m/s], spin [rad/s].
 
-    angle [rad] and aspect [-] (longer over shorter semi-axis of an ellipse) are None where the file does not have them.
+    angle [rad] and aspect [-] (longer over shorter semi-axis of an ellipse) are None where the file does not have them. stored: the
+    elements themselves, where the file is a result file.
     """
 
     x: Floats
@@ -33,10 +35,13 @@ class GrainFile:
     spin: Floats
     angle: Floats | None
     aspect: Floats | None
+    stored: StoredGrains | None = None
 
 
 def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
-    """The grains of a CSV file whose lengths are in `unit`. ScenarioError names the file, the line and what is wrong."""
+    """The grains of a result file, or of a CSV file whose lengths are in `unit`. ScenarioError names the file, the line and what is wrong."""
+    if is_result_file(path):
+        return _of_results(path)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError:
@@ -72,3 +77,14 @@ def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
     x, y, radius, vx, vy = (column[name] * SCALE[unit] for name in LENGTHS)
     angle = np.radians(column["angle"]) if "angle" in given else None
     return GrainFile(x, y, radius, vx, vy, column["spin"], angle, column["aspect"] if "aspect" in given else None)
+
+
+def _of_results(path: Path) -> GrainFile:
+    stored = read_stored_grains(path)
+    mean = stored.means
+    radius = np.sqrt(np.bincount(stored.body, stored.a * stored.b))
+    round_ = np.array_equal(stored.a, stored.b)
+    return GrainFile(
+        mean(stored.x), mean(stored.y), radius, mean(stored.vx), mean(stored.vy), mean(stored.spin),
+        angle=stored.angle if not round_ else None, aspect=stored.a / stored.b if not round_ else None, stored=stored,
+    )  # fmt: skip

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from dem_cli.errors import ScenarioError
@@ -16,6 +17,7 @@ from dem_cli.scenario.model import Scenario, tracked_exist
 from dem_cli.scenario.overrides import apply_overrides
 from dem_cli.scenario.raw_record import RecordError
 from dem_cli.scenario.stages import Shake
+from dem_cli.scenario.stored_grains import StoredGrains
 from dem_cli.scenario.table import NOTHING
 
 Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
@@ -94,6 +96,19 @@ def _records(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> li
     return found
 
 
+def _stored_shape(stored: StoredGrains, name: str, scenario: Scenario) -> list[Found]:
+    """Grains of a result file are of the scenario's shape; bonded grains and clumps of one template may stand for each other."""
+    shape, elements = scenario.grains.shape, scenario.grains.elements
+    alike = {"bonded": "clump", "clump": "bonded"}
+    if stored.shape != shape and stored.shape != alike.get(shape):
+        rule = f'is not the shape of the grains of {name}, which is "{stored.shape}"'
+        return [(("grains", "shape"), shape, rule, f'Write shape = "{stored.shape}", or take another file')]
+    if any(np.bincount(stored.body) != elements):
+        rule = f"has {elements} discs a grain, those of {name} have {np.bincount(stored.body).max()}"
+        return [(("grains", "template"), NOTHING, rule, "Write the template of the run that made the file")]
+    return []
+
+
 def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> list[Found]:
     """Mistakes of the file of grains, and of keys that disagree with it."""
     packing = raw.get("packing")
@@ -114,6 +129,8 @@ def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) 
         rule = f"differs from the {len(grains.x)} grains of {name}"
         found.append((("grains", "count"), count, rule, "Leave count out: the file gives it"))
     shape, ratio = scenario.grains.shape, scenario.grains.aspect_ratio
+    if grains.stored:
+        found += _stored_shape(grains.stored, name, scenario)
     if grains.aspect is not None and shape != "ellipse":
         rule = f'has a column aspect, which is none of shape = "{shape}"'
         found.append((("packing", "file"), name, rule, 'Leave the column out, or write shape = "ellipse"'))

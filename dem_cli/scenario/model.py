@@ -15,6 +15,7 @@ from dem_cli.scenario.grain_file import GrainFile, read_grain_file
 from dem_cli.scenario.packing import Packing
 from dem_cli.scenario.quantities import Length, Whole
 from dem_cli.scenario.stages import Stage
+from dem_cli.scenario.stored_grains import is_result_file
 from dem_cli.scenario.table import Given, Mistake, Table, key
 from dem_cli.scenario.tables import Contact, Container, Grains, Integration, Material, Output
 
@@ -53,7 +54,12 @@ class Scenario(Table):
 
     @classmethod
     def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
-        return [("contact", "ellipse_test")] if tuple(path) == ("grains", "shape") and value != "ellipse" else []
+        if tuple(path) == ("grains", "shape") and value != "ellipse":
+            return [("contact", "ellipse_test")]
+        if tuple(path) != ("packing", "file"):
+            return []
+        given = ("radius", "count", *(("aspect_ratio", "orientation") if is_result_file(str(value)) else ()))
+        return [("grains", name) for name in given]
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:

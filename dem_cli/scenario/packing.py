@@ -64,8 +64,9 @@ class Packing(Table):
     )
     file: str | None = key(
         None,
-        "CSV file beside the scenario, a grain a line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), "
-        "angle (degrees), spin (rad/s) and, for ellipses, aspect (a/b) may follow",
+        "result file of dem run (.h5): its grains as they lie in its last frame, without their contacts' memory; or CSV file, a grain a "
+        "line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), angle (degrees), spin (rad/s) and, for ellipses, "
+        "aspect (a/b) may follow",
         example="grains.csv",
     )
     file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")
