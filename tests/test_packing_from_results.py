@@ -16,6 +16,7 @@ from dem_cli.errors import ScenarioError
 from dem_cli.results import open_results
 from dem_cli.run import run_scenario
 from dem_cli.scenario import Scenario, load_scenario
+from dem_cli.state import Grains
 
 TEXT = """
 [grains]
@@ -36,6 +37,10 @@ method = "falling"
 grid = {{ columns = 3, spacing = "5 cm", shift = "1 cm" }}
 [[stage]]
 kind = "settle"
+name = "first"
+[[stage]]
+kind = "run"
+duration = "0.05 s"
 """
 SHAPES = {"disc": "", "ellipse": "aspect_ratio=2", "bonded": 'template="pair"', "clump": 'template="pair"'}
 AGAIN = ("packing.method=file", "packing.file=packed.h5", "seed=77")
@@ -82,6 +87,23 @@ def test_grains_lie_as_they_lay(folder: Path, shape: str) -> None:
         assert results.stages[0].end < 0.3
 
 
+def test_the_end_of_a_stage(folder: Path) -> None:
+    """Not where the run ended, but where the stage did."""
+    place = folder / "disc"
+    found = build_assembly(again(place, "disc", "packing.stage=first")).grains
+    with open_results(place / "packed.h5") as results:
+        wanted = results.frame(int(np.flatnonzero(results.frame_times == results.stages[0].end)[0])).grains
+        assert results.frame(-1).time > results.stages[0].end
+    np.testing.assert_array_equal(found.x, wanted.x)
+    np.testing.assert_array_equal(found.vy, wanted.vy)
+    assert not np.array_equal(found.vy, results_last(place).vy)
+
+
+def results_last(place: Path) -> Grains:
+    with open_results(place / "packed.h5") as results:
+        return results.frame(-1).grains
+
+
 def test_bonded_grains_may_become_rigid(folder: Path) -> None:
     assembly = build_assembly(again(folder / "bonded", "bonded", "grains.shape=clump"))
     assert assembly.rigid
@@ -100,6 +122,7 @@ def test_another_density_gives_another_mass(folder: Path) -> None:
     [
         ("disc", ("packing.file=none.h5",), "none.h5.*: does not exist"),
         ("disc", ("packing.file=text.h5",), "is not a result file of dem run"),
+        ("disc", ("packing.stage=second",), 'no stage "second" has ended there'),
         ("bonded", ("grains.template=triangle",), "has 3 discs a grain, those of packed.h5 have 2"),
         ("ellipse", ("grains.shape=disc",), 'is not the shape of the grains of packed.h5, which is "ellipse"'),
     ],

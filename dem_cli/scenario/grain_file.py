@@ -38,10 +38,13 @@ class GrainFile:
     stored: StoredGrains | None = None
 
 
-def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
-    """The grains of a result file, or of a CSV file whose lengths are in `unit`. ScenarioError names the file, the line and what is wrong."""
+def read_grain_file(path: Path, unit: str = "m", stage: str | None = None) -> GrainFile:
+    """The grains of a result file, at the end of a stage of it if one is named, or of a CSV file whose lengths are in `unit`.
+
+    ScenarioError names the file, the line and what is wrong.
+    """
     if is_result_file(path):
-        return _of_results(path)
+        return _of_results(path, stage)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except FileNotFoundError:
@@ -79,8 +82,8 @@ def read_grain_file(path: Path, unit: str = "m") -> GrainFile:
     return GrainFile(x, y, radius, vx, vy, column["spin"], angle, column["aspect"] if "aspect" in given else None)
 
 
-def _of_results(path: Path) -> GrainFile:
-    stored = read_stored_grains(path)
+def _of_results(path: Path, stage: str | None) -> GrainFile:
+    stored = read_stored_grains(path, stage)
     mean = stored.means
     radius = np.sqrt(np.bincount(stored.body, stored.a * stored.b))
     round_ = np.array_equal(stored.a, stored.b)

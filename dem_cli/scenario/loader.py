@@ -117,7 +117,10 @@ def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) 
         return []
     unit = packing.get("file_unit", "m") if isinstance(packing, dict) else "m"
     try:
-        grains = read_grain_file(folder / name, unit if unit in SCALE else "m")
+        stage = packing.get("stage") if isinstance(packing, dict) else None
+        grains = read_grain_file(
+            folder / name, unit if unit in SCALE else "m", stage if isinstance(stage, str) else None
+        )
     except ScenarioError as error:
         rule, _, remedy = str(error).removeprefix(f"{folder / name}: ").rpartition(". ")
         return [(("packing", "file"), name, rule, remedy)]

@@ -93,7 +93,8 @@ class Scenario(Table):
 
     def grain_file(self) -> GrainFile:
         """The grains of `packing.file`, in metres. ScenarioError if there is none or it cannot be read."""
-        return read_grain_file(self._folder / (self.packing.file or ""), self.packing.file_unit)
+        packing = self.packing
+        return read_grain_file(self._folder / (packing.file or ""), packing.file_unit, packing.stage)
 
     @property
     def grain_count(self) -> int:

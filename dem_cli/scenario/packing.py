@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 from dem_cli.scenario.quantities import Distance, Length, Number, Whole
+from dem_cli.scenario.stored_grains import is_result_file
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
 Method = Literal["falling", "rejection", "local-move", "growth", "insertion", "file"]
@@ -64,12 +65,17 @@ class Packing(Table):
     )
     file: str | None = key(
         None,
-        "result file of dem run (.h5): its grains as they lie in its last frame, without their contacts' memory; or CSV file, a grain a "
+        "result file of dem run (.h5): its grains as they lie, without their contacts' memory; or CSV file, a grain a "
         "line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), angle (degrees), spin (rad/s) and, for ellipses, "
         "aspect (a/b) may follow",
         example="grains.csv",
     )
     file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")
+    stage: str | None = key(
+        None,
+        "stage of a result file, by name, at whose end its grains are taken (default: as they are in the last frame)",
+        example="packing",
+    )
     void_ratio: Annotated[float, Number(gt=0.0, le=1000.0)] | None = key(
         None,
         "void ratio of the filled height before the first stage (default: rejection 1.2, insertion 0.25, falling from random places 2; "
@@ -109,6 +115,8 @@ class Packing(Table):
             if name in raw and method not in methods:
                 words = " or ".join(f'"{one}"' for one in methods)
                 yield Mistake((name,), f'is no key of method = "{method}"', f"Leave it out, or write method = {words}")
+        if "stage" in raw and not is_result_file(str(raw.get("file", ""))):
+            yield Mistake(("stage",), "is a key for result files", "Leave it out, or write the name of one as file")
         if method == "file" and "file" not in raw:
             yield Mistake(("file",), "is missing", 'Add for example file = "grains.csv"')
         for one, other in (("grid", "file"), ("void_ratio", "height")):

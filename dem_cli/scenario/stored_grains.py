@@ -1,9 +1,10 @@
-"""Result files as packings: the grains of the last frame, element by element."""
+"""Result files as packings: the grains of one frame, element by element."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ SUFFIXES = (".h5", ".hdf5")
 
 @dataclass(frozen=True)
 class StoredGrains:
-    """Elements of the last frame of a result file, shape (n,) each, without what had left the container.
+    """Elements of one frame of a result file, shape (n,) each, without what had left the container.
 
     x, y, a, b [m], angle [rad], vx, vy [m/s], spin [rad/s], body as in state.Grains; shape: key of the run that made them.
     """
@@ -44,8 +45,8 @@ def is_result_file(path: Path | str) -> bool:
     return Path(path).suffix.lower() in SUFFIXES
 
 
-def read_stored_grains(path: Path) -> StoredGrains:
-    """The grains of the last frame of a result file. ScenarioError if it is none, or holds no frame."""
+def read_stored_grains(path: Path, stage: str | None = None) -> StoredGrains:
+    """The grains of a result file at the end of a stage, or in the last frame. ScenarioError if it is none, or holds no such frame."""
     import tomllib
 
     import h5py
@@ -59,7 +60,7 @@ def read_stored_grains(path: Path) -> StoredGrains:
             if frames == 0:
                 raise ScenarioError(f"{path}: holds no frame yet. Wait for its run, or take another file")
             n = int(file.attrs["elements" if "elements" in file.attrs else "grains"])
-            start = int(root["Steps/PointOffsets"][frames - 1])
+            start = int(root["Steps/PointOffsets"][_frame_of(path, file, stage, frames)])
             rows = slice(start, start + n)
             shape = tomllib.loads(str(file.attrs["resolved"]))["grains"]["shape"]
             radius = data["radius"][:n]
@@ -81,3 +82,15 @@ def read_stored_grains(path: Path) -> StoredGrains:
     columns = {name: values[inside] for name, values in (moving | {"a": a, "b": b}).items()}
     kept = body[inside]
     return StoredGrains(shape=shape, body=np.cumsum(np.diff(kept, prepend=kept[0]) != 0), **columns)
+
+
+def _frame_of(path: Path, file: Any, stage: str | None, frames: int) -> int:
+    """Number of the frame at the end of a stage; the last one of all without."""
+    if stage is None:
+        return frames - 1
+    names = [str(name) for name in file["stages/name"].asstr()[: int(file["stages"].attrs["rows"])]]
+    number, ends = file["frames/stage"][:frames], file["frames/stage_end"][:frames]
+    for k in np.flatnonzero(ends):
+        if names[int(number[k])] == stage:
+            return int(k)
+    raise ScenarioError(f'{path}: no stage "{stage}" has ended there. Its stages are {", ".join(names)}')
