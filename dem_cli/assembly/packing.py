@@ -8,11 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from dem_cli.assembly.bodies import Bodies
-from dem_cli.assembly.growth import grow
-from dem_cli.assembly.insertion import insert
-from dem_cli.assembly.moves import lattice, shake_down
 from dem_cli.assembly.region import Packed, Region, Tell
-from dem_cli.assembly.rejection import reject
 from dem_cli.assembly.shapes import Sizes, build_grains, draw_sizes, stored_grains
 from dem_cli.scenario import Scenario
 from dem_cli.state import Bonds, Floats, Grains
@@ -63,6 +59,12 @@ def region_of(scenario: Scenario, bodies: Bodies) -> Region:
 def _pack(
     scenario: Scenario, bodies: Bodies, angle: Floats, region: Region, generator: np.random.Generator, tell: Tell
 ) -> Packed:
+    """By the scenario's method. Kernels are imported here, so that `dem check`, which packs nothing, starts without Numba."""
+    from dem_cli.assembly.growth import grow
+    from dem_cli.assembly.insertion import insert
+    from dem_cli.assembly.moves import lattice, shake_down
+    from dem_cli.assembly.rejection import reject
+
     packing = scenario.packing
     if packing.method == "growth":
         return grow(bodies, angle, region, generator, tell)
