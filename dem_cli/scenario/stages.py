@@ -35,7 +35,7 @@ class ExtraDamping(Table):
 
 
 class Settle(Table):
-    """Waits until the sample is at rest. Ends when both measures are below their limits, or at the time limit."""
+    """Waits until the sample is at rest. Ends when both measures are below their limits three rows of the series in a row, or at the limit."""
 
     kind: Literal["settle"] = key(doc='"settle"', example="settle")
     name: str = key("settle", "name in reports", example="packing")

@@ -18,6 +18,7 @@ from dem_cli.engines.explicit.timestep import choose_time_step
 from dem_cli.scenario import Run, Scenario, Settle, Shake
 from dem_cli.state import Frame
 
+QUIET_ROWS = 3  # rows of the series in which a bed must be at rest: one instant of a vibration may look like it
 STEPS_PER_CALL = 4e7  # grain-steps between two chances to interrupt: about a second
 
 
@@ -52,6 +53,7 @@ class ExplicitEngine:
     def _run_stage(self, stage: Settle | Shake | Run, ground: Ground, damping: tuple[float, float]) -> Iterator[Frame]:
         schedule = Schedule(self.scenario.output, self.stage_started, stage.longest)
         self.state.sort()
+        quiet = 0
         everything = frozenset({"series", "frames", "tracks"})
         # A later stage begins where the last one ended, and that frame has been written.
         yield self._frame(ground, everything if self.stage == 0 else frozenset(), stage_start=True)
@@ -62,6 +64,8 @@ class ExplicitEngine:
             frame = self._frame(ground, due)
             if "series" in due and isinstance(stage, Settle):
                 at_rest = self._rest(stage, frame)
+                quiet = quiet + 1 if at_rest else 0
+                at_rest = at_rest if quiet >= QUIET_ROWS or schedule.over(moment) else ""
             if at_rest or schedule.over(moment):
                 reason = at_rest or (
                     f"still moving after {stage.limit:g} s: {self._restlessness(frame)}"
