@@ -9,7 +9,9 @@ import click
 
 @click.command(name="compare", short_help="Compare runs side by side, and with the thesis; draw it.")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
-@click.option("--thesis", "with_thesis", is_flag=True, help="Set the thesis' chapter 8 beside: its numbers and statements.")
+@click.option(
+    "--thesis", "with_thesis", is_flag=True, help="Set the thesis' chapter 8 beside: its numbers and statements."
+)
 @click.option("--each", is_flag=True, help="A row a file: do not pool seeds.")
 @click.option("--grains", is_flag=True, help="Also a row for each tracked grain.")
 @click.option("--json", "as_json", is_flag=True, help="All numbers for machines: SI units, null where undefined.")
@@ -65,7 +67,7 @@ def command(
     from dem_cli.report.text import show
 
     target = output or (Path(f"compare-{what}.png") if what else None)
-    check_request(what or "table", stage if target else None, drawn=target is not None, stage_given=stage is not None)
+    check_request(what or "table", stage=stage is not None)
     if target:
         check_target(target, force)
     found = compare(files, with_thesis=with_thesis, each=each)

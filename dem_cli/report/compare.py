@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from dem_cli.report import thesis
-from dem_cli.report.cases import Case, Outcome, Pooled, outcome, pool, pooled
+from dem_cli.report.cases import Case, Pooled, pool, pooled
+from dem_cli.report.outcome import Outcome, outcome
 from dem_cli.report.thesis_checks import Beside, Check, beside, checks
 from dem_cli.results import open_results
 
@@ -47,10 +48,11 @@ class Comparison:
     def as_dict(self) -> dict[str, Any]:
         """Tree for JSON: SI units, null where a quantity is not defined."""
         tree = {
-            "cases": [
-                {"kind": case.kind, "shaking": case.shaking, **dataclasses.asdict(case)} for case in self.cases
-            ],
-            **{name: [dataclasses.asdict(one) for one in getattr(self, name)] for name in ("effects", "beside", "checks")},
+            "cases": [{"kind": case.kind, "shaking": case.shaking, **dataclasses.asdict(case)} for case in self.cases],
+            **{
+                name: [dataclasses.asdict(one) for one in getattr(self, name)]
+                for name in ("effects", "beside", "checks")
+            },
             "uncovered": self.uncovered,
             "why": self.why,
             "warnings": self.said,
@@ -70,6 +72,9 @@ def compare(files: Sequence[Path], *, with_thesis: bool = False, each: bool = Fa
             runs.append(outcome(results))
     cases, said = pool(runs)
     shown = pool(runs, each=True)[0] if each else cases
+    versions = sorted({run.version for run in runs})
+    if len(versions) > 1:
+        said.append(f"the files were written by different versions of the program: {', '.join(versions)}")
     lines = [*said, *(line for run in runs for line in run.said)]
     found, missing = checks(cases) if with_thesis else ([], [])
     return Comparison(

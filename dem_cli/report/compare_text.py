@@ -81,7 +81,8 @@ def _contacts(cases: Sequence[Case]) -> Block:
         )
 
     header = (
-        *HEAD, "coordination", "sliding [%]", "roughness [mm]", "tilt/depth", "displaced [mm]", "velocity [mm/s]", "most airborne", "escaped", "bond gap/radius",
+        *HEAD, "coordination", "sliding [%]", "roughness [mm]", "tilt/depth", "displaced [mm]",
+         "velocity [mm/s]", "most airborne", "escaped", "bond gap/radius",
     )  # fmt: skip
     title = "Contacts and surface, packed -> shaken; while shaken: tilt of the surface, rms displacement and velocity of all grains"
     return Block(title, header, tuple(map(row, cases)), left=2)
@@ -132,7 +133,11 @@ def _grains(cases: Sequence[Case]) -> Block:
         )
 
     rows = [
-        row(case, run.file, one, k) for case in cases for run in case.runs for one in run.moved for k in range(len(one.ways))
+        row(case, run.file, one, k)
+        for case in cases
+        for run in case.runs
+        for one in run.moved
+        for k in range(len(one.ways))
     ]
     header = (*HEAD, "file", "stage", "No.", *(label.replace("|", "") for _, label, _ in MOVED))
     return Block("Each tracked grain", header, tuple(rows), left=3)
@@ -166,13 +171,18 @@ def _beside(found: Comparison) -> Block:
             cells += [text(one.here, sign + form, factor), number(one.thesis * factor, sign + printed)]
             cells.append(number(one.difference * factor, "+" + form))
         rows.append((three[0].kind, f"{three[0].quantity}{' [%]' if percent else ''}", *cells, three[0].figures))
-    header = ("case", "", *(name for state in ("packed", "shaken", "change") for name in (state, "thesis", "diff.")), "figures")
+    header = (
+        "case",
+        "",
+        *(name for state in ("packed", "shaken", "change") for name in (state, "thesis", "diff.")),
+        "figures",
+    )
     return Block("Beside the thesis, 400 gal 10 Hz", header, tuple(rows), left=2)
 
 
 def _checks(found: Comparison) -> Block:
     """Two rows a statement: what the thesis says, and what is measured."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for one in found.checks:
         rows.append(("holds" if one.holds else "does not hold", one.source, one.statement))
         rows.append(("", "", f"    {one.numbers}  ({one.of})"))

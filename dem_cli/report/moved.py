@@ -80,9 +80,7 @@ def moved(results: Results, number: int, begins: float) -> Moved | str:
     ways = tuple(
         Way(int(grain), *(float(columns[one.name][k]) for one in fields(Way)[1:])) for k, grain in enumerate(way.ids)
     )
-    mean = {
-        name: float(np.mean(np.abs(columns[name]) if name in ("x", "turn") else columns[name])) for name in MEANS
-    }
+    mean = {name: float(np.mean(np.abs(columns[name]) if name in ("x", "turn") else columns[name])) for name in MEANS}
     return Moved(number, ways, mean)
 
 

@@ -98,9 +98,11 @@ def _of(cases: Sequence[Case], sine: Sine, family: str = "") -> list[Case]:
 
 
 def alike(one: Case, other: Case) -> bool:
-    """Whether two cases differ in nothing but grains and what is recorded, as far as their variants tell."""
-    both = one.variant.keys() & other.variant.keys()
-    return all(one.variant[key] == other.variant[key] for key in both if not key.startswith(("grains.", "output.")))
+    """Whether two cases differ in nothing that bears on a comparison of their grains: law, material, container and scheme."""
+    a, b = one.first.settings, other.first.settings
+    shared = ("contact.", "material.", "container.", "integration.integrator")
+    keys = {key for key in {**a, **b} if key.startswith(shared) and key != "contact.ellipse_test"}
+    return all(a.get(key) == b.get(key) for key in keys)
 
 
 def _together(cases: Sequence[Case], sine: Sine, families: Sequence[str]) -> Iterator[tuple[Case, ...]]:
@@ -134,7 +136,9 @@ def _denser(cases: Sequence[Case]) -> Iterator[Check]:
     for case in _of(cases, thesis.SHAKING):
         name = thesis.PLURAL[case.first.family]
         fell = sum(run.measures["void_ratio_change"] < 0.0 for run in case.runs)
-        numbers = f"{text(case.measures['void_ratio_packed'], '.4f')} -> {text(case.measures['void_ratio_shaken'], '.4f')}"
+        numbers = (
+            f"{text(case.measures['void_ratio_packed'], '.4f')} -> {text(case.measures['void_ratio_shaken'], '.4f')}"
+        )
         yield Check(
             thesis.DENSER[case.first.family],
             f"{name}: the void ratio is lower after shaking",
@@ -145,7 +149,14 @@ def _denser(cases: Sequence[Case]) -> Iterator[Check]:
 
 
 def _ordered(
-    cases: Sequence[Case], families: Sequence[str], name: str, what: str, source: str, form: str, unit: str, factor: float
+    cases: Sequence[Case],
+    families: Sequence[str],
+    name: str,
+    what: str,
+    source: str,
+    form: str,
+    unit: str,
+    factor: float,
 ) -> Iterator[Check]:
     """Whether a measure grows from family to family; those that are absent are passed over."""
     there = [family for family in families if _of(cases, thesis.SHAKING, family)]
@@ -265,15 +276,17 @@ VISIBLE = (
 def _amplitudes(cases: Sequence[Case]) -> Iterator[Check]:
     for kind, grid in _grids(cases):
         for name, what, form, unit, factor in VISIBLE:
-            value = {sine: case.measures[name].mean for sine, case in grid.items()}
-            span = max(value.values()) - min(value.values())
+            value = {sine: case.measures[name].mean for sine, case in grid.items() if case.measures[name].n}
+            span = max(value.values(), default=0.0) - min(value.values(), default=0.0)
+            if not span > 0.0:
+                continue
             mild = {}
             for statement, part in (
-                ("at 10 Hz no large change with the amplitude", [s for s in grid if math.isclose(s[1], 10.0)]),
-                ("at 400 gal no large change with the frequency", [s for s in grid if math.isclose(s[0], 4.0)]),
+                ("at 10 Hz no large change with the amplitude", [s for s in value if math.isclose(s[1], 10.0)]),
+                ("at 400 gal no large change with the frequency", [s for s in value if math.isclose(s[0], 4.0)]),
             ):
                 mild.update({sine: value[sine] for sine in part})
-                if len(part) < 2 or len(part) == len(grid):
+                if len(part) < 2 or len(part) == len(value):
                     continue
                 change = max(value[s] for s in part) - min(value[s] for s in part)
                 shown = ", ".join(f"{_name(s)} {value[s] * factor:{form}}" for s in sorted(part, key=_strength))
@@ -284,7 +297,7 @@ def _amplitudes(cases: Sequence[Case]) -> Iterator[Check]:
                     f"{shown}{unit}; {change / span:.2f} of the range",
                     change <= LITTLE * span,
                 )
-            strong = {s: value[s] for s in grid if s not in mild and s[0] > 4.0 and s[1] < 10.0}
+            strong = {s: value[s] for s in value if s not in mild and s[0] > 4.0 and s[1] < 10.0}
             if not strong or not mild:
                 continue
             strongest = max(strong, key=_strength)
@@ -300,9 +313,9 @@ def _amplitudes(cases: Sequence[Case]) -> Iterator[Check]:
 
 def _periods(cases: Sequence[Case]) -> Iterator[Check]:
     for kind, grid in _grids(cases):
-        tilt = {sine: case.measures["tilt"].mean for sine, case in grid.items()}
-        most = max(tilt, key=lambda s: tilt[s])
-        if len(grid) > 2 and any(thesis.is_shaking(*s, (12.0, 1.0)) for s in grid):
+        tilt = {sine: case.measures["tilt"].mean for sine, case in grid.items() if case.measures["tilt"].n}
+        if len(tilt) > 2 and any(thesis.is_shaking(*s, (12.0, 1.0)) for s in tilt):
+            most = max(tilt, key=lambda s: tilt[s])
             yield Check(
                 "8.9.1",
                 "1200 gal 1 Hz is like sloshing: the surface tilts most there",
@@ -311,8 +324,8 @@ def _periods(cases: Sequence[Case]) -> Iterator[Check]:
                 thesis.is_shaking(*most, (12.0, 1.0)),
             )
         said, grows = [], True
-        for amplitude in sorted({sine[0] for sine in grid}):
-            line = sorted((s for s in grid if s[0] == amplitude), key=lambda s: -s[1])
+        for amplitude in sorted({sine[0] for sine in tilt}):
+            line = sorted((s for s in tilt if s[0] == amplitude), key=lambda s: -s[1])
             if len(line) > 1:
                 said.append(f"{_name(line[0])} to {line[-1][1]:.3g} Hz: " + ", ".join(f"{tilt[s]:.3f}" for s in line))
                 grows = grows and all(tilt[a] < tilt[b] for a, b in pairwise(line))
