@@ -87,7 +87,7 @@ def ways(*moves: tuple[float, float, float, float]) -> Moved:
         replace(way, grain=k, start_x=x0, start_y=level, level=level, x=x, y=y)
         for k, (x0, level, x, y) in enumerate(moves)
     )
-    mean = {name: 0.0 for name in MEANS} | {"x": sum(abs(move[2]) for move in moves) / len(moves)}
+    mean = dict.fromkeys(MEANS, 0.0) | {"x": sum(abs(move[2]) for move in moves) / len(moves)}
     return Moved(2, every, mean)
 
 
