@@ -18,6 +18,7 @@ COMMANDS = {
     "check": "Check a scenario; print derived constants, time step, run time.",
     "run": "Run a scenario; write a result file.",
     "report": "Print what a result file says; compare several.",
+    "compare": "Compare runs side by side, and with the thesis; draw it.",
     "render": "Draw a picture from a result file.",
     "schema": "Print the JSON Schema of scenario files, for editors.",
 }

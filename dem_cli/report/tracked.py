@@ -15,6 +15,7 @@ from dem_cli.state import Floats, Ints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
 # More panels than these cannot be read on one page.
@@ -104,8 +105,6 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
     """One panel a grain, all to the same scale: its way from the start (ring) to the end (dot), coloured by
     time.
     """
-    from matplotlib.collections import LineCollection
-
     count = min(len(tracked.ids), MOST_PANELS)
     x, y = (a[:, :count] - a[0, :count] for a in (tracked.x, tracked.y))
     factor, unit = display_unit("m", largest(x, y))
@@ -125,17 +124,7 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
         if k >= count:
             ax.set_axis_off()
             continue
-        points = np.column_stack([x[:, k], y[:, k]])
-        lines = LineCollection(
-            np.stack([points[:-1], points[1:]], axis=1),  # type: ignore[arg-type]
-            array=0.5 * (tracked.time[:-1] + tracked.time[1:]),
-            cmap=SEQUENTIAL,
-            linewidths=0.9,
-            capstyle="round",
-        )
-        ax.add_collection(lines)
-        ax.plot(*points[0], "o", ms=5, mfc="white", mec="black", mew=0.9)
-        ax.plot(*points[-1], "o", ms=4, color="black")
+        lines = draw_path(ax, x[:, k], y[:, k], tracked.time)
         ax.set_aspect("equal")
         ax.set_xlim(middle_x[k] - half_x, middle_x[k] + half_x)
         ax.set_ylim(middle_y[k] - half_y, middle_y[k] + half_y)
@@ -147,6 +136,24 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
         bar.set_label("t [s]")
     heading(figure, results, f"Trajectories in the container, {text}{_left_out(tracked)}")
     return figure
+
+
+def draw_path(ax: Axes, x: Floats, y: Floats, time: Floats) -> LineCollection:
+    """Draw a path from its start (ring) to its end (dot), coloured by `time`; returns the lines that carry the colours."""
+    from matplotlib.collections import LineCollection
+
+    points = np.column_stack([x, y])
+    lines = LineCollection(
+        np.stack([points[:-1], points[1:]], axis=1),  # type: ignore[arg-type]
+        array=0.5 * (time[:-1] + time[1:]),
+        cmap=SEQUENTIAL,
+        linewidths=0.9,
+        capstyle="round",
+    )
+    ax.add_collection(lines)
+    ax.plot(*points[0], "o", ms=5, mfc="white", mec="black", mew=0.9)
+    ax.plot(*points[-1], "o", ms=4, color="black")
+    return lines
 
 
 def _columns(count: int) -> int:

@@ -1,0 +1,81 @@
+"""`dem compare`: runs side by side, seeds pooled, the thesis beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command(name="compare", short_help="Compare runs side by side, and with the thesis; draw it.")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.option(
+    "--thesis", "with_thesis", is_flag=True, help="Set the thesis' chapter 8 beside: its numbers and statements."
+)
+@click.option("--each", is_flag=True, help="A row a file: do not pool seeds.")
+@click.option("--grains", is_flag=True, help="Also a row for each tracked grain.")
+@click.option("--json", "as_json", is_flag=True, help="All numbers for machines: SI units, null where undefined.")
+@click.option(
+    "-o",
+    "output",
+    type=click.Path(path_type=Path),
+    metavar="PICTURE",
+    help="Draw a picture too: PNG, SVG or PDF [default with --what: compare-KIND.png].",
+)
+@click.option(
+    "--what", metavar="KIND", help="The picture: table, grid, histories or trajectories [default with -o: table]."
+)
+@click.option(
+    "--stage", type=int, metavar="N", help="Histories, trajectories: stage N from 1 [default: the last of shaking]."
+)
+@click.option("--dpi", type=click.FloatRange(20, 1200), default=200.0, show_default=True, help="Resolution of PNG.")
+@click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
+def command(
+    files: tuple[Path, ...],
+    with_thesis: bool,
+    each: bool,
+    grains: bool,
+    as_json: bool,
+    output: Path | None,
+    what: str | None,
+    stage: int | None,
+    dpi: float,
+    force: bool,
+) -> None:
+    """Compare the runs of result FILEs: a row a case, in the order of shaking and shape.
+
+    Runs that differ in their seed only are one case: mean +- standard deviation (number of runs). Settings in
+    which cases of one shape and shaking differ stand beside the shape. Incomplete runs stand alone and are in no
+    statement.
+
+    \b
+    table         void ratio before and after, roughness and airborne grains of each case
+    grid          change of the void ratio over amplitude and frequency, a matrix for each shape
+    histories     displacement x, y and rotation of tracked grains: a column a case, a row a grain, same axes
+    trajectories  their paths, likewise
+
+    Histories and trajectories show the first run of each case.
+    """
+    # Imported here so that `dem --help` stays quick.
+    import json
+    import sys
+
+    from dem_cli.report.compare import compare
+    from dem_cli.report.compare_figures import check_request, draw
+    from dem_cli.report.compare_text import blocks
+    from dem_cli.report.look import check_target, save, style
+    from dem_cli.report.text import show
+
+    target = output or (Path(f"compare-{what}.png") if what else None)
+    check_request(what or "table", stage=stage is not None)
+    if target:
+        check_target(target, force)
+    found = compare(files, with_thesis=with_thesis, each=each)
+    if target:
+        with style():
+            save(draw(found, what or "table", stage=stage, with_thesis=with_thesis), target, dpi)
+        click.echo(f"wrote {target}", err=True)
+    if as_json:
+        click.echo(json.dumps(found.as_dict(), indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        show(blocks(found, grains=grains), sys.stdout)
