@@ -225,6 +225,7 @@ def inner_ellipse_pairs(rows, outlines, lists, edges, skin, deepest):
             hi, _, _ = support(f[o], f[o + 1], f[o + 2], nx, ny)
             hj, _, _ = support(f[e], f[e + 1], f[e + 2], nx, ny)
             if dx * nx + dy * ny - hi - hj > skin:
+                lists.memory[k, 3] = lists.memory[k, 4] = 0.0  # a normal that nobody follows is none
                 continue
             nx, ny, gap = pair_gap(rows, outlines, i, j, lists.memory[k, 3], lists.memory[k, 4])
             lists.memory[k, 3], lists.memory[k, 4] = nx, ny
