@@ -18,9 +18,9 @@ from dem_cli.jit import kernel
 SHARE, NORMAL, TANGENTIAL, ROLLING = range(4)
 # Force on i along n and t over kn [m], moment on i over kn [m^2]; length at rest [m]; slip at the common point [m], turn of j against i [rad].
 PULL, SHEAR, MOMENT, LENGTH, SLIP, ROLL = range(4, 10)
-# What holds within a step: see `_geometry` and `_relative`.
-NX, NY, AI, BI, AJ, BJ, AWAY, BESIDE, ABOUT = range(12, 21)
-BOND = 21
+# What holds within a step: see `_geometry` and `_work_motion`.
+NX, NY, AI, BI, AJ, BJ, REACH, AWAY, BESIDE, ABOUT = range(12, 22)
+BOND = 22
 TINY = 1e-280  # a viscosity that is none
 
 
@@ -41,25 +41,36 @@ class Bonded(NamedTuple):
 
 
 @kernel(inline=True)
-def _geometry(dx, dy, motion, share):
-    """(nx, ny, ai, bi, aj, bj): unit vector, and where the common point lies from i and from j, along n and t = (-ny, nx).
+def _geometry(dx, dy, motion, share, ahead):
+    """(nx, ny, ai, bi, aj, bj, reach): unit vector, where the common point lies from i and from j now, along n and t = (-ny, nx), and length.
 
-    dx, dy: from i to j. The unit vector is that of the middle of the step, from the motion of the last one: so a turning body neither
-    shrinks nor grows. The forces act at the one common point of now: whatever their direction, they keep the angular momentum.
+    dx, dy: from i to j. Unit vector and length are those after `ahead` steps of the last motion, of the middle of the step (0.5): what moves
+    across the bond then neither stretches nor shortens it as it turns. But the forces act at the one common point of now: whatever their
+    direction, they keep the angular momentum.
     """
     ui, vi, _, uj, vj, _ = motion
-    mx, my = dx + 0.5 * (uj - ui), dy + 0.5 * (vj - vi)
-    inverse = 1.0 / root(mx * mx + my * my)
+    mx, my = dx + ahead * (uj - ui), dy + ahead * (vj - vi)
+    reach = root(mx * mx + my * my)
+    inverse = 1.0 / reach
     nx, ny = mx * inverse, my * inverse
     along, across = dx * nx + dy * ny, dy * nx - dx * ny
-    return nx, ny, share * along, share * across, (share - 1.0) * along, (share - 1.0) * across
+    return nx, ny, share * along, share * across, (share - 1.0) * along, (share - 1.0) * across, reach
 
 
 @kernel(inline=True)
-def _relative(motion, geometry):
-    """Motion of the second disc against the first at the common point: along n, along t [m], and about [rad]."""
+def _relative(motion, geometry, share):
+    """Motion of the second disc against the first in the middle of the step: away along n, beside along t [m], and about [rad]."""
     ui, vi, wi, uj, vj, wj = motion
-    nx, ny, ai, bi, aj, bj = geometry
+    nx, ny, reach = geometry[0], geometry[1], geometry[6]
+    du, dv = uj - ui, vj - vi
+    return du * nx + dv * ny, dv * nx - du * ny - reach * ((1.0 - share) * wj + share * wi), wj - wi
+
+
+@kernel(inline=True)
+def _work_motion(motion, geometry):
+    """The same at the common point of now, where the forces do their work."""
+    ui, vi, wi, uj, vj, wj = motion
+    nx, ny, ai, bi, aj, bj, _ = geometry
     du, dv = uj - ui, vj - vi
     return du * nx + dv * ny - wj * bj + wi * bi, dv * nx - du * ny + wj * aj - wi * ai, wj - wi
 
@@ -68,7 +79,7 @@ def _relative(motion, geometry):
 def _pushed(motion, geometry, inertia, kick, pull, shear, moment):
     """The motion after `kick` steps of a bond's forces on the first disc and their reactions on the second."""
     ui, vi, wi, uj, vj, wj = motion
-    nx, ny, ai, bi, aj, bj = geometry
+    nx, ny, ai, bi, aj, bj, _ = geometry
     mi, mj, ki, kj = inertia
     fx, fy = kick * (pull * nx - shear * ny), kick * (pull * ny + shear * nx)
     return (
@@ -82,21 +93,22 @@ def _pushed(motion, geometry, inertia, kick, pull, shear, moment):
 
 
 @kernel(inline=True)
-def _settled(motion, geometry, inertia, kick, give, forces):
+def _settled(motion, geometry, inertia, kick, share, give, forces):
     """Motion and forces once each dashpot gives what the motion after it asks for (backward Euler), one direction after the other.
 
     give: kn dt over the three viscosities; forces: (pull, shear, moment) that the motion holds already.
     """
     mi, mj, ki, kj = inertia
-    _, _, ai, bi, aj, bj = geometry
+    ai, aj, reach = geometry[2], geometry[4], geometry[6]
     pull, shear, moment = forces
-    away, _, _ = _relative(motion, geometry)
-    more = (away - give[0] * pull) / (give[0] + kick * (mi + mj + ki * bi * bi + kj * bj * bj))
+    away, _, _ = _relative(motion, geometry, share)
+    more = (away - give[0] * pull) / (give[0] + kick * (mi + mj))
     motion, pull = _pushed(motion, geometry, inertia, kick, more, 0.0, 0.0), pull + more
-    _, beside, _ = _relative(motion, geometry)
-    more = (beside - give[1] * shear) / (give[1] + kick * (mi + mj + ki * ai * ai + kj * aj * aj))
+    _, beside, _ = _relative(motion, geometry, share)
+    turning = ki * ai * share - kj * aj * (1.0 - share)
+    more = (beside - give[1] * shear) / (give[1] + kick * (mi + mj + reach * turning))
     motion, shear = _pushed(motion, geometry, inertia, kick, 0.0, more, 0.0), shear + more
-    _, _, about = _relative(motion, geometry)
+    _, _, about = _relative(motion, geometry, share)
     more = (about - give[2] * moment) / (give[2] + kick * (ki + kj))
     motion, moment = _pushed(motion, geometry, inertia, kick, 0.0, 0.0, more), moment + more
     return motion, (pull, shear, moment)
@@ -127,20 +139,21 @@ def _write(rows, a, b, motion):
 
 @kernel(inline=True)
 def _known(data, o):
-    return data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ]
+    return data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ], data[o + REACH]
 
 
 @kernel()
-def prepare_bonds(rows, bonds, begin, end):
-    """Geometry and motion of the bonds begin..end-1 before their discs are pushed."""
+def prepare_bonds(rows, bonds, begin, end, ahead):
+    """Geometry and motion of the bonds begin..end-1 before their discs are pushed; ahead: see `_geometry`."""
     data = bonds.data
     for k in range(begin, end):
         a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
         motion, _ = _read(rows, a, b)
         dx, dy = rows[b + X] - rows[a + X], rows[b + Y] - rows[a + Y]
-        geometry = _geometry(dx, dy, motion, data[o + SHARE])
-        data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ] = geometry
-        data[o + AWAY], data[o + BESIDE], data[o + ABOUT] = _relative(motion, geometry)
+        geometry = _geometry(dx, dy, motion, data[o + SHARE], ahead)
+        for m in range(7):
+            data[o + NX + m] = geometry[m]
+        data[o + AWAY], data[o + BESIDE], data[o + ABOUT] = _work_motion(motion, geometry)
 
 
 @kernel()
@@ -163,7 +176,7 @@ def solve_bonds(rows, bonds, begin, end, kick, unit, backward):
         motion, inertia = _read(rows, a, b)
         give = unit / data[o + NORMAL], unit / data[o + TANGENTIAL], unit / max(data[o + ROLLING], TINY)
         forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
-        motion, forces = _settled(motion, _known(data, o), inertia, kick, give, forces)
+        motion, forces = _settled(motion, _known(data, o), inertia, kick, data[o + SHARE], give, forces)
         data[o + PULL], data[o + SHEAR], data[o + MOMENT] = forces
         _write(rows, a, b, motion)
     for k in range(begin, end):
@@ -171,7 +184,7 @@ def solve_bonds(rows, bonds, begin, end, kick, unit, backward):
         motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
         forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
         before = data[o + AWAY], data[o + BESIDE], data[o + ABOUT]
-        lost += _losses(kick, forces, before, _relative(motion, _known(data, o)))
+        lost += _losses(kick, forces, before, _work_motion(motion, _known(data, o)))
     return lost
 
 
@@ -182,7 +195,7 @@ def follow_bonds(rows, bonds, begin, end):
     for k in range(begin, end):
         o = BOND * k
         motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
-        _, beside, about = _relative(motion, _known(data, o))
+        _, beside, about = _relative(motion, _known(data, o), data[o + SHARE])
         data[o + SLIP] += beside
         data[o + ROLL] += about
 
@@ -232,12 +245,12 @@ def move_pairs(rows, bonds, begin, end, kick, fx, fy, unit):
         xi, yi, before_i, after_i, mi, ki, ri, arc_i, ratio_i = _kicked(rows, a, kick, fx, fy)
         xj, yj, before_j, after_j, mj, kj, rj, arc_j, ratio_j = _kicked(rows, b, kick, fx, fy)
         before, inertia = before_i + before_j, (mi, mj, ki, kj)
-        geometry = _geometry(xj - xi, yj - yi, before, share)
+        geometry = _geometry(xj - xi, yj - yi, before, share, 0.5)
         give = unit / normal, unit / tangential, unit / maximum(rolling, TINY)
         motion = _pushed(after_i + after_j, geometry, inertia, kick, pull, shear, moment)
-        motion, forces = _settled(motion, geometry, inertia, kick, give, (pull, shear, moment))
-        relative = _relative(motion, geometry)
-        lost = lost + _losses(kick, forces, _relative(before, geometry), relative)
+        motion, forces = _settled(motion, geometry, inertia, kick, share, give, (pull, shear, moment))
+        lost = lost + _losses(kick, forces, _work_motion(before, geometry), _work_motion(motion, geometry))
+        relative = _relative(motion, geometry, share)
         store_rows(data, o + PULL, BOND, forces[0], forces[1], forces[2], length)
         zero = spread(0.0)
         store_rows(data, o + SLIP, BOND, slip + relative[1], roll + relative[2], zero, zero)

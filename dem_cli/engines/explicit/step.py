@@ -67,7 +67,7 @@ def _move_chunk(rows, velocity, begin, end, c, kick, fx, fy, motion, kn, dt, bac
             fastest, lost = move_pairs(rows, bonds, first, middle, kick, fx, fy, kn * dt)
             ledger[BONDS] += 0.5 * kn * lost
             first, begin = middle, begin + 2 * (middle - first)
-        prepare_bonds(rows, bonds, first, last)
+        prepare_bonds(rows, bonds, first, last, 0.5)
         ledger[DAMPING] += kn * push(rows, velocity, begin, end, kick, fx, fy, motion, dt)
         ledger[BONDS] += 0.5 * kn * solve_bonds(rows, bonds, first, last, kick, kn * dt, backward)
         fastest = max(fastest, drift(rows, velocity, begin, end, thesis))
@@ -88,7 +88,7 @@ def _last_half_kick(rows, velocity, n, fx, fy, motion, kn, dt, backward, ledger,
         ledger[DAMPING] += kn * push(cores.rows, cores.velocity, 0, bodies, 0.5, fx, fy, motion, dt)
     else:
         if bonds is not None:
-            prepare_bonds(rows, bonds, 0, bonds.first.size)
+            prepare_bonds(rows, bonds, 0, bonds.first.size, 0.0)
         ledger[DAMPING] += kn * push(rows, velocity, 0, n, 0.5, fx, fy, motion, dt)
         if bonds is not None:
             lost = solve_bonds(rows, bonds, 0, bonds.first.size, 0.5, kn * dt, backward)
