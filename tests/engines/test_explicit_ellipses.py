@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -39,13 +40,23 @@ def as_ellipses(state: ExplicitState) -> None:
 
 
 def loose_ellipses(count: int, seed: int, ratio: float, speed: float = 0.0) -> Grains:
-    """`loose_grains` in a box 16 cm wide, pressed into ellipses of any direction; the first quarter stay discs."""
+    """Ellipses of any direction and, a quarter, discs, apart from each other in a box 32 cm wide."""
     rng = np.random.default_rng(seed)
-    discs = loose_grains(count, seed, 0.16, speed)
-    k = np.where(np.arange(count) < count // 4, 1.0, ratio)
+    spacing = 0.019 * math.sqrt(ratio)
+    discs = loose_grains(count, seed, 0.02 * int(0.3 / spacing) + 1e-9, speed)
+    k = np.where(np.arange(count) % 4 == 0, 1.0, ratio)
     a, b = discs.radius * np.sqrt(k), discs.radius / np.sqrt(k)
-    grains = Grains.ellipses(2.0 * discs.x, 2.0 * discs.y, a, b, rng.uniform(0.0, 2.0 * math.pi, count), 2480.0, 1.0)
+    scale = spacing / 0.02
+    angle = rng.uniform(0.0, 2.0 * math.pi, count)
+    grains = Grains.ellipses(scale * discs.x + 0.005, scale * discs.y + 0.005, a, b, angle, 2480.0, 1.0)
     return replace(grains, vx=discs.vx, vy=discs.vy, spin=discs.spin)
+
+
+@cache
+def heap_of(ratio: float, count: int = 40, seed: int = 2) -> Grains:
+    """Fallen on the floor and nearly at rest; its contacts' springs are forgotten."""
+    grains = run_of(loose_ellipses(count, seed, ratio, 0.3), 8000).state.grains()
+    return replace(grains, vx=0.2 * grains.vx, vy=0.2 * grains.vy)
 
 
 def walled(changes: dict[str, Any] | None = None) -> Any:
@@ -59,20 +70,23 @@ def walled(changes: dict[str, Any] | None = None) -> Any:
 def test_discs_as_ellipses(settled: bool, settled_box: Callable[[int, int], Grains]) -> None:
     """Friction, damping, walls and spins: the code for ellipses moves discs as that for discs does."""
     scenario = box({"contact.damping_ratio": 0.4, "contact.friction": 0.3})
-    grains = settled_box(60, 1) if settled else loose_grains(60, seed=5, width=0.16, speed=1.0)
+    grains = settled_box(60, 1) if settled else loose_grains(60, seed=5, width=0.16, speed=0.4)
     one, two = engine_of(scenario, grains), engine_of(scenario, grains)
     as_ellipses(two.state)
-    field = np.tile(one.gravity + (2.0, 0.0), (401, 1))
+    field = np.tile(one.gravity + (2.0, 0.0), (401 if settled else 251, 1))
     for engine in (one, two):
         engine.state.first_forces()
         engine.state.advance(engine.time_step, field, NOTHING)
     a, b = one.state.grains(), two.state.grains()
-    for name in ("x", "y", "angle", "vx", "vy"):
+    size = a.radius.min()
+    for name in ("x", "y", "vx", "vy"):
         assert np.abs(getattr(a, name) - getattr(b, name)).max() < 1e-12, name
-    assert np.abs(a.spin - b.spin).max() < 1e-10
+    for name in ("angle", "spin"):
+        assert np.abs(getattr(a, name) - getattr(b, name)).max() * size < 1e-12, name
     ours, theirs = one.state.contacts(), two.state.contacts()
     assert (ours.i.tolist(), ours.j.tolist()) == (theirs.i.tolist(), theirs.j.tolist())
-    assert len(ours) > (60 if settled else 3)
+    struck = np.abs(a.spin - grains.spin) > 1e-3
+    assert len(ours) > 60 if settled else np.count_nonzero(struck) > 15
     for name in ("nx", "ny", "px", "py", "overlap", "stretch"):
         np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-11)
     for name in ("normal", "shear"):
@@ -143,7 +157,7 @@ def test_energy_of_a_glancing_pair_is_of_second_order() -> None:
         bench = bench_of(grains, dt=DT / parts)
         before = bench.frame().energy.stored
         worst = 0.0
-        for _ in range(150):
+        for _ in range(500):
             bench.steps(parts)
             worst = max(worst, abs(bench.frame().energy.stored / before - 1.0))
         assert np.abs(bench.frame().grains.vx[0]) < 0.9
@@ -167,8 +181,8 @@ def turning(bench: Bench, steps: int) -> Floats:
 
 def held(grains: Grains, **more: Any) -> Bench:
     """Elements that move as they do whatever pushes them."""
-    bench = bench_of(grains, **more)
-    bench.state.rows[:, MOBILITY] = 0.0
+    bench = bench_of(grains, integration_max_overlap=1.0, **more)
+    bench.state.rows[:, MOBILITY] = 1e-300
     return bench
 
 
@@ -184,7 +198,7 @@ def test_force_of_a_turning_contact_is_continuous(ratio: float, other: str) -> N
     for steps in (2000, 4000):
         dt = 2.0 * math.pi / spin / steps
         if other == "end of a wall":
-            grains, walls = ellipses([0.0], [0.0], ratio, 0.2), segments([(0.8 * b, 0.3 * b, 3.0 * a, -a)])
+            grains, walls = ellipses([0.0], [0.0], ratio, 0.2), segments([(0.5 * (a + b), 0.3 * b, 3.0 * a, -a)])
         else:
             k = np.array([ratio, 1.0 if other == "disc" else ratio])
             grains, walls = ellipses([0.0, distance], [0.0, 0.2 * RADIUS], k, np.array([0.2, 1.1])), None
@@ -232,8 +246,11 @@ def test_one_step_of_newton_follows_the_normal() -> None:
 # -- what is shown -----------------------------------------------------------------------------------------------------
 
 
-def run_of(grains: Grains, steps: int, changes: dict[str, Any] | None = None, damping: float = 0.5) -> Any:
+def run_of(
+    grains: Grains, steps: int, changes: dict[str, Any] | None = None, damping: float = 0.5, enlarged: bool = False
+) -> Any:
     engine = engine_of(walled({"contact.damping_ratio": damping, **(changes or {})}), grains)
+    engine.state.outlines = engine.state.outlines._replace(enlarged=enlarged)
     engine.state.first_forces()
     assert engine.state.advance(engine.time_step, np.tile(engine.gravity, (steps + 1, 1)), NOTHING)[0] == 0
     return engine
@@ -243,7 +260,7 @@ def run_of(grains: Grains, steps: int, changes: dict[str, Any] | None = None, da
 @pytest.mark.parametrize("test", ["exact", "enlarged"])
 def test_contacts_agree_with_forces(ratio: float, test: str) -> None:
     """Every overlap that a search over all pairs finds is shown; forces and moments of contacts add up to those of the step."""
-    engine = run_of(loose_ellipses(40, 2, ratio, 0.5), 2500, {"contact.ellipse_test": test})
+    engine = run_of(heap_of(ratio), 300, enlarged=test == "enlarged")
     state, grains = engine.state, engine.state.grains()
     frame = state.frame(engine.gravity, np.zeros((3, 2)), frozenset({"series"}), 0, heavy=True)
     contacts = frame.contacts
@@ -288,7 +305,7 @@ def test_contacts_agree_with_forces(ratio: float, test: str) -> None:
 
 def test_points_of_contact_lie_on_both_outlines() -> None:
     """A contact's point is half the overlap inside either outline, along the normal."""
-    engine = run_of(loose_ellipses(40, 2, 2.0, 0.5), 2500)
+    engine = run_of(heap_of(2.0), 300)
     grains, contacts = engine.state.grains(), engine.state.contacts()
     seen = 0
     for k, (i, j) in enumerate(zip(contacts.i, contacts.j, strict=True)):
@@ -305,10 +322,10 @@ def test_points_of_contact_lie_on_both_outlines() -> None:
 
 
 def test_order_of_ids_does_not_matter() -> None:
-    grains = loose_ellipses(40, 3, 2.0, 0.5)
+    grains = heap_of(2.0)
     number = np.random.default_rng(1).permutation(40)
-    one = run_of(grains, 1500)
-    two = run_of(replace(grains.take(number), id=np.arange(40), body=np.arange(40)), 1500)
+    one = run_of(grains, 300)
+    two = run_of(replace(grains.take(number), id=np.arange(40), body=np.arange(40)), 300)
     a, b = one.state.grains().take(number), two.state.grains()
     for name in ("x", "y", "angle", "vx", "vy"):
         np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=0, atol=1e-9)
@@ -335,7 +352,7 @@ def test_order_of_ids_does_not_matter() -> None:
 @pytest.mark.parametrize("ratio", [2.0, 5.0])
 def test_sorting_in_the_middle(ratio: float) -> None:
     """Rows sorted and lists made anew between calls: nothing that is shown changes, and the motion goes on but for rounding."""
-    one = run_of(loose_ellipses(40, 4, ratio, 0.5), 800)
+    one = run_of(heap_of(ratio), 300)
     before = copy.deepcopy((one.state.grains(), one.state.contacts()))
     order = one.state.order.copy()
     other = copy.deepcopy(one.state)
@@ -355,7 +372,7 @@ def test_sorting_in_the_middle(ratio: float) -> None:
         other.advance(one.time_step, field, NOTHING)
     a, b = one.state.grains(), other.grains()
     for name in ("x", "y", "angle", "vx", "vy"):
-        np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=0, atol=1e-10)
+        np.testing.assert_allclose(getattr(b, name), getattr(a, name), rtol=0, atol=1e-9)
     p, q = one.state.contacts(), other.contacts()
     assert len(p) > 15
     assert (p.i.tolist(), p.j.tolist()) == (q.i.tolist(), q.j.tolist())
@@ -366,18 +383,20 @@ def test_sorting_in_the_middle(ratio: float) -> None:
 
 
 def test_same_bits_twice_and_chunks_to_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
-    grains = loose_ellipses(50, 6, 2.5, 0.5)
-    one, two = run_of(grains, 1200), run_of(grains, 1200)
+    one, two = (run_of(loose_ellipses(50, 6, 2.5, 0.5), 2000) for _ in range(2))
     assert one.state.rows.tobytes() == two.state.rows.tobytes()
     assert one.state.ledger.tobytes() == two.state.ledger.tobytes()
     assert one.state.lists.memory.tobytes() == two.state.lists.memory.tobytes()
+    grains = heap_of(2.5, 50, 6)
+    whole = run_of(grains, 300)
     monkeypatch.setattr(build, "CHUNK", 8)
-    parts = run_of(grains, 1200)
+    parts = run_of(grains, 300)
+    assert len(whole.state.edges) == 2
     assert len(parts.state.edges) == 8
-    assert len(one.state.contacts()) > 15
+    assert len(whole.state.contacts()) > 20
     for name in ("x", "y", "angle", "vx", "vy"):
         np.testing.assert_allclose(
-            getattr(parts.state.grains(), name), getattr(one.state.grains(), name), rtol=0, atol=1e-9
+            getattr(parts.state.grains(), name), getattr(whole.state.grains(), name), rtol=0, atol=1e-9
         )
 
 
