@@ -17,6 +17,8 @@ from dem_cli.jit import kernel
 
 SAMPLES = 64  # directions of the search; the narrowest peak of an ellipse of aspect ratio 5 is some four of them wide
 NEAR = 0.2  # rad: a known direction that moves further than this is not trusted
+TRUSTED = 0.01  # rad: further than this is trusted only where the gap is open
+CLOSE = 1e-9  # rad: Newton's method squares its error, so one step from here is exact
 
 
 @kernel(inline=True)
@@ -54,30 +56,28 @@ def gap_slopes(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny):
 def _climb(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny, reach):
     """The maximum of the gap within `reach` [rad] of n: Newton's method, halving the bracket where it fails.
 
+    Once a step is as small as CLOSE the next would be lost in rounding, and the gap itself is too flat to tell which is best.
     Returns (nx, ny, gap, angle from the start [rad]).
     """
-    low, high, angle = -reach, reach, 0.0
-    x, y = nx, ny
-    best_x, best_y, best, best_angle = nx, ny, -np.inf, 0.0
+    low, high, angle, x, y, gap = -reach, reach, 0.0, nx, ny, 0.0
     for _ in range(60):
-        g, g1, g2 = gap_slopes(dx, dy, mi, pi, qi, mj, pj, qj, x, y)
-        if g > best:
-            best_x, best_y, best, best_angle = x, y, g, angle
+        gap, g1, g2 = gap_slopes(dx, dy, mi, pi, qi, mj, pj, qj, x, y)
         if g1 > 0.0:
             low = angle
         else:
             high = angle
         new = angle - g1 / g2 if g2 < 0.0 else 2.0 * reach
-        if not low <= new <= high:
+        last = abs(new - angle) <= CLOSE
+        if last:
+            gap += 0.5 * g1 * (new - angle)
+        elif not low < new < high:
             new = 0.5 * (low + high)
-        if abs(new - angle) <= 1e-16 or high - low <= 1e-16:
-            break
         angle = new
         c, s = math.cos(angle), math.sin(angle)
         x, y = nx * c - ny * s, nx * s + ny * c
-    else:
-        return best_x, best_y, best, best_angle
-    return x, y, max(g, best), angle
+        if last:
+            break
+    return x, y, gap, angle
 
 
 @kernel()
@@ -86,10 +86,13 @@ def widest_gap(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny):
 
     dx, dy: from centre i to centre j [m], not both 0; nx, ny: a direction known to be near, or (0, 0): then, and where the known one proves to
     be far off, all directions are searched. Returns (nx, ny, gap).
+
+    An open gap has one maximum only, since n.delta - h_i - h_j is concave over the plane. Outlines that overlap have others, deep ones, at
+    more than 90 degrees from it.
     """
     if nx * nx + ny * ny > 0.0:
         x, y, gap, moved = _climb(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny, 2.0 * NEAR)
-        if abs(moved) < NEAR:
+        if abs(moved) < TRUSTED or (abs(moved) < NEAR and gap > 0.0):
             return x, y, gap
     step = 2.0 * math.pi / SAMPLES
     distance = math.sqrt(dx * dx + dy * dy)
@@ -109,7 +112,8 @@ def widest_gap(dx, dy, mi, pi, qi, mj, pj, qj, nx, ny):
 def wall_gap(x, y, m, p, q, x0, y0, x1, y1):
     """Direction from a centre (x, y) in which the gap to a wall, the segment from (x0, y0) to (x1, y1), is largest, and the gap [m].
 
-    The wall is met along its face where the point of the outline that reaches furthest lies beside it, else at the nearer end.
+    In each direction the end that is reached first counts. So the largest gap is that of the face where the point of the outline that
+    reaches furthest lies beside the wall, or that of an end, seen in a direction in which it is the nearer one.
     """
     ex, ey = x1 - x0, y1 - y0
     length = math.sqrt(ex * ex + ey * ey)
@@ -119,11 +123,23 @@ def wall_gap(x, y, m, p, q, x0, y0, x1, y1):
     side = 1.0 if distance >= 0.0 else -1.0
     nx, ny = -side * ey, side * ex
     h, h1, _ = support(m, p, q, nx, ny)
-    along = h1 * (-ny * ex + nx * ey) - (dx * ex + dy * ey)
-    if 0.0 <= along <= length:
-        return nx, ny, side * distance - h
-    if along > length:
-        dx, dy = x1 - x, y1 - y
-    if dx * dx + dy * dy == 0.0:
-        return nx, ny, -h
-    return widest_gap(dx, dy, m, p, q, 0.0, 0.0, 0.0, 0.0, 0.0)
+    foot = -(dx * ex + dy * ey)
+    along, gap = foot + h1 * (-ny * ex + nx * ey), side * distance - h
+    beside = 0.0 <= along <= length
+    # No end is within reach where the whole outline lies beside the wall: its circle has a radius of less than sqrt(2 m).
+    inner = min(foot, length - foot)
+    if beside and (gap >= 0.0 or (inner > 0.0 and inner * inner >= 2.0 * m)):
+        return nx, ny, gap
+    if not beside:
+        gap = -np.inf
+    for end in range(2):
+        if end == 1:
+            dx, dy = x1 - x, y1 - y
+        if dx * dx + dy * dy > 0.0:
+            ux, uy, open_by = widest_gap(dx, dy, m, p, q, 0.0, 0.0, 0.0, 0.0, 0.0)
+            onwards = ux * ex + uy * ey
+            if open_by > gap and (onwards >= 0.0 if end == 0 else onwards <= 0.0):
+                nx, ny, gap = ux, uy, open_by
+    if gap == -np.inf:
+        gap = side * distance - h
+    return nx, ny, gap

@@ -18,9 +18,10 @@ from dem_cli.jit import kernel
 SHARE, NORMAL, TANGENTIAL, ROLLING = range(4)
 # Force on i along n and t over kn [m], moment on i over kn [m^2]; length at rest [m]; slip at the common point [m], turn of j against i [rad].
 PULL, SHEAR, MOMENT, LENGTH, SLIP, ROLL = range(4, 10)
-# What holds within a step: see `_geometry` and `_relative`.
-NX, NY, AI, BI, AJ, BJ, AWAY, BESIDE, ABOUT = range(12, 21)
-BOND = 21
+# What holds within a step: see `_geometry` and `_work_motion`.
+NX, NY, AI, BI, AJ, BJ, REACH, AWAY, BESIDE, ABOUT = range(12, 22)
+PULLED, SHEARED, TURNED = range(22, 25)  # what the forces came to over the step: forces times kicks
+BOND = 25
 TINY = 1e-280  # a viscosity that is none
 
 
@@ -42,24 +43,35 @@ class Bonded(NamedTuple):
 
 @kernel(inline=True)
 def _geometry(dx, dy, motion, share):
-    """(nx, ny, ai, bi, aj, bj): unit vector, and where the common point lies from i and from j, along n and t = (-ny, nx).
+    """(nx, ny, ai, bi, aj, bj, reach): unit vector, where the common point lies from i and from j now, along n and t = (-ny, nx), and length.
 
-    dx, dy: from i to j. The unit vector is that of the middle of the step, from the motion of the last one: so a turning body neither
-    shrinks nor grows. The forces act at the one common point of now: whatever their direction, they keep the angular momentum.
+    dx, dy: from i to j. Unit vector and length are those of the middle of the step, from the motion of the last one: what moves across the
+    bond then neither stretches nor shortens it as it turns. But the forces act at the one common point of now: whatever their
+    direction, they keep the angular momentum.
     """
     ui, vi, _, uj, vj, _ = motion
     mx, my = dx + 0.5 * (uj - ui), dy + 0.5 * (vj - vi)
-    inverse = 1.0 / root(mx * mx + my * my)
+    reach = root(mx * mx + my * my)
+    inverse = 1.0 / reach
     nx, ny = mx * inverse, my * inverse
     along, across = dx * nx + dy * ny, dy * nx - dx * ny
-    return nx, ny, share * along, share * across, (share - 1.0) * along, (share - 1.0) * across
+    return nx, ny, share * along, share * across, (share - 1.0) * along, (share - 1.0) * across, reach
 
 
 @kernel(inline=True)
-def _relative(motion, geometry):
-    """Motion of the second disc against the first at the common point: along n, along t [m], and about [rad]."""
+def _relative(motion, geometry, share):
+    """Motion of the second disc against the first in the middle of the step: away along n, beside along t [m], and about [rad]."""
     ui, vi, wi, uj, vj, wj = motion
-    nx, ny, ai, bi, aj, bj = geometry
+    nx, ny, reach = geometry[0], geometry[1], geometry[6]
+    du, dv = uj - ui, vj - vi
+    return du * nx + dv * ny, dv * nx - du * ny - reach * ((1.0 - share) * wj + share * wi), wj - wi
+
+
+@kernel(inline=True)
+def _work_motion(motion, geometry):
+    """The same at the common point of now, where the forces do their work."""
+    ui, vi, wi, uj, vj, wj = motion
+    nx, ny, ai, bi, aj, bj, _ = geometry
     du, dv = uj - ui, vj - vi
     return du * nx + dv * ny - wj * bj + wi * bi, dv * nx - du * ny + wj * aj - wi * ai, wj - wi
 
@@ -68,7 +80,7 @@ def _relative(motion, geometry):
 def _pushed(motion, geometry, inertia, kick, pull, shear, moment):
     """The motion after `kick` steps of a bond's forces on the first disc and their reactions on the second."""
     ui, vi, wi, uj, vj, wj = motion
-    nx, ny, ai, bi, aj, bj = geometry
+    nx, ny, ai, bi, aj, bj, _ = geometry
     mi, mj, ki, kj = inertia
     fx, fy = kick * (pull * nx - shear * ny), kick * (pull * ny + shear * nx)
     return (
@@ -82,31 +94,42 @@ def _pushed(motion, geometry, inertia, kick, pull, shear, moment):
 
 
 @kernel(inline=True)
-def _settled(motion, geometry, inertia, kick, give, forces):
+def _settled(motion, geometry, inertia, share, give, forces):
     """Motion and forces once each dashpot gives what the motion after it asks for (backward Euler), one direction after the other.
 
-    give: kn dt over the three viscosities; forces: (pull, shear, moment) that the motion holds already.
+    give: kn dt over the three viscosities; forces: (pull, shear, moment) that the motion holds already. What they lack acts over a whole step.
     """
     mi, mj, ki, kj = inertia
-    _, _, ai, bi, aj, bj = geometry
+    ai, aj, reach = geometry[2], geometry[4], geometry[6]
     pull, shear, moment = forces
-    away, _, _ = _relative(motion, geometry)
-    more = (away - give[0] * pull) / (give[0] + kick * (mi + mj + ki * bi * bi + kj * bj * bj))
-    motion, pull = _pushed(motion, geometry, inertia, kick, more, 0.0, 0.0), pull + more
-    _, beside, _ = _relative(motion, geometry)
-    more = (beside - give[1] * shear) / (give[1] + kick * (mi + mj + ki * ai * ai + kj * aj * aj))
-    motion, shear = _pushed(motion, geometry, inertia, kick, 0.0, more, 0.0), shear + more
-    _, _, about = _relative(motion, geometry)
-    more = (about - give[2] * moment) / (give[2] + kick * (ki + kj))
-    motion, moment = _pushed(motion, geometry, inertia, kick, 0.0, 0.0, more), moment + more
+    away, _, _ = _relative(motion, geometry, share)
+    more = (away - give[0] * pull) / (give[0] + mi + mj)
+    motion, pull = _pushed(motion, geometry, inertia, 1.0, more, 0.0, 0.0), pull + more
+    _, beside, _ = _relative(motion, geometry, share)
+    turning = ki * ai * share - kj * aj * (1.0 - share)
+    more = (beside - give[1] * shear) / (give[1] + mi + mj + reach * turning)
+    motion, shear = _pushed(motion, geometry, inertia, 1.0, 0.0, more, 0.0), shear + more
+    _, _, about = _relative(motion, geometry, share)
+    more = (about - give[2] * moment) / (give[2] + ki + kj)
+    motion, moment = _pushed(motion, geometry, inertia, 1.0, 0.0, 0.0, more), moment + more
     return motion, (pull, shear, moment)
 
 
 @kernel(inline=True)
-def _losses(kick, forces, before, after):
-    """Twice the energy over kn that a bond takes from a motion: its force times the mean of the motions before and after the step."""
-    return kick * (
-        forces[0] * (before[0] + after[0]) + forces[1] * (before[1] + after[1]) + forces[2] * (before[2] + after[2])
+def _losses(impulses, before, after):
+    """Twice the energy over kn that a bond takes from a motion: its forces over the step times the mean of the motions before and after."""
+    return (
+        impulses[0] * (before[0] + after[0]) + impulses[1] * (before[1] + after[1]) + impulses[2] * (before[2] + after[2])
+    )
+
+
+@kernel(inline=True)
+def _impulses(kick, old, new):
+    """Forces over the step: the known ones over `kick` steps, what was found to lack over a whole one."""
+    return (
+        kick * old[0] + (new[0] - old[0]),
+        kick * old[1] + (new[1] - old[1]),
+        kick * old[2] + (new[2] - old[2]),
     )
 
 
@@ -127,7 +150,7 @@ def _write(rows, a, b, motion):
 
 @kernel(inline=True)
 def _known(data, o):
-    return data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ]
+    return data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ], data[o + REACH]
 
 
 @kernel()
@@ -139,39 +162,43 @@ def prepare_bonds(rows, bonds, begin, end):
         motion, _ = _read(rows, a, b)
         dx, dy = rows[b + X] - rows[a + X], rows[b + Y] - rows[a + Y]
         geometry = _geometry(dx, dy, motion, data[o + SHARE])
-        data[o + NX], data[o + NY], data[o + AI], data[o + BI], data[o + AJ], data[o + BJ] = geometry
-        data[o + AWAY], data[o + BESIDE], data[o + ABOUT] = _relative(motion, geometry)
+        for m in range(7):
+            data[o + NX + m] = geometry[m]
+        data[o + AWAY], data[o + BESIDE], data[o + ABOUT] = _work_motion(motion, geometry)
 
 
 @kernel()
-def solve_bonds(rows, bonds, begin, end, kick, unit, backward):
+def solve_bonds(rows, bonds, begin, end, kick, unit, backward, settle):
     """Forces of the bonds begin..end-1 on velocities that the other forces have changed already, over `kick` steps.
 
     Implicit, so any viscosity is stable, and a load F creeps at exactly F/C. One Gauss-Seidel sweep a step, in turn from either end and begun
     with the forces of the last step, follows chains as well as the full solution does (without that start it is wrong by
-    orders of magnitude). unit: kn dt. Returns twice the energy lost, over kn.
+    orders of magnitude). unit: kn dt. settle: False in the half kick that ends a call, so that two halves come to what one whole kick would:
+    corrections over half a step would be twice as large, and from call to call they would grow. Returns twice the energy lost, over kn.
     """
     data, lost = bonds.data, 0.0
     for k in range(begin, end):
         a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
         motion, inertia = _read(rows, a, b)
         forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        data[o + PULLED], data[o + SHEARED], data[o + TURNED] = _impulses(kick, forces, forces)
         _write(rows, a, b, _pushed(motion, _known(data, o), inertia, kick, *forces))
-    for m in range(end - begin):
+    for m in range(end - begin if settle else 0):
         k = end - 1 - m if backward else begin + m
         a, b, o = np.int64(bonds.first[k]), np.int64(bonds.second[k]), BOND * k
         motion, inertia = _read(rows, a, b)
         give = unit / data[o + NORMAL], unit / data[o + TANGENTIAL], unit / max(data[o + ROLLING], TINY)
-        forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
-        motion, forces = _settled(motion, _known(data, o), inertia, kick, give, forces)
+        old = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        motion, forces = _settled(motion, _known(data, o), inertia, data[o + SHARE], give, old)
         data[o + PULL], data[o + SHEAR], data[o + MOMENT] = forces
+        data[o + PULLED], data[o + SHEARED], data[o + TURNED] = _impulses(kick, old, forces)
         _write(rows, a, b, motion)
     for k in range(begin, end):
         o = BOND * k
         motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
-        forces = data[o + PULL], data[o + SHEAR], data[o + MOMENT]
+        impulses = data[o + PULLED], data[o + SHEARED], data[o + TURNED]
         before = data[o + AWAY], data[o + BESIDE], data[o + ABOUT]
-        lost += _losses(kick, forces, before, _relative(motion, _known(data, o)))
+        lost += _losses(impulses, before, _work_motion(motion, _known(data, o)))
     return lost
 
 
@@ -182,7 +209,7 @@ def follow_bonds(rows, bonds, begin, end):
     for k in range(begin, end):
         o = BOND * k
         motion, _ = _read(rows, np.int64(bonds.first[k]), np.int64(bonds.second[k]))
-        _, beside, about = _relative(motion, _known(data, o))
+        _, beside, about = _relative(motion, _known(data, o), data[o + SHARE])
         data[o + SLIP] += beside
         data[o + ROLL] += about
 
@@ -235,9 +262,11 @@ def move_pairs(rows, bonds, begin, end, kick, fx, fy, unit):
         geometry = _geometry(xj - xi, yj - yi, before, share)
         give = unit / normal, unit / tangential, unit / maximum(rolling, TINY)
         motion = _pushed(after_i + after_j, geometry, inertia, kick, pull, shear, moment)
-        motion, forces = _settled(motion, geometry, inertia, kick, give, (pull, shear, moment))
-        relative = _relative(motion, geometry)
-        lost = lost + _losses(kick, forces, _relative(before, geometry), relative)
+        old = (pull, shear, moment)
+        motion, forces = _settled(motion, geometry, inertia, share, give, old)
+        impulses = _impulses(kick, old, forces)
+        lost = lost + _losses(impulses, _work_motion(before, geometry), _work_motion(motion, geometry))
+        relative = _relative(motion, geometry, share)
         store_rows(data, o + PULL, BOND, forces[0], forces[1], forces[2], length)
         zero = spread(0.0)
         store_rows(data, o + SLIP, BOND, slip + relative[1], roll + relative[2], zero, zero)

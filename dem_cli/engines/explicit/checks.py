@@ -18,7 +18,7 @@ FEEDING = 1e-3  # of the energy put in: dashpots and friction may not give back 
 
 def blown_up(scenario: Scenario, state: ExplicitState, status: int, i: int, j: int, time_step: float) -> RunError:
     """The error for a status of `advance` that is not FINE: grain, time, cause and remedy."""
-    grain = int(state.order[i])
+    grain = int(state.body_id[state.order[i]])
     when = f"t = {state.time:.6g} s"
     if status == NOT_A_NUMBER:
         cause = f"the position of grain {grain} is no longer a number"
@@ -26,7 +26,7 @@ def blown_up(scenario: Scenario, state: ExplicitState, status: int, i: int, j: i
         return RunError(f"{when}: {cause}. {remedy}")
     n, overlap = len(state.mass), state.overlap(i, j)
     least = float(state.radius[i] if j >= n else min(state.radius[i], state.radius[j]))
-    other = f"the {state.wall_names[j - n]} wall" if j >= n else f"grain {int(state.order[j])}"
+    other = f"the {state.wall_names[j - n]} wall" if j >= n else f"grain {int(state.body_id[state.order[j]])}"
     limit = scenario.integration.max_overlap
     return RunError(
         f"{when}: grain {grain} and {other} overlap by {overlap / least:.2g} of the smaller radius, more than "
@@ -59,7 +59,7 @@ class Watch:
             raise RunError(
                 f"t = {frame.time:.6g} s: kinetic energy rose from {before.kinetic:.3g} to {now.kinetic:.3g} J with {-given:.3g} J "
                 f"out of nothing, contacts went from {contacts} to {len(frame.contacts or ())}, grain "
-                f"{int(frame.grains.id[fastest])} is the fastest: the time step is unstable{_remedy(time_step)}"
+                f"{int(frame.grains.body[fastest])} is the fastest: the time step is unstable{_remedy(time_step)}"
             )
 
 

@@ -78,10 +78,13 @@ def _approach(rows, outlines, pairs, k):
     turn = slope / (along + hi2 + hj2)
     overlap = hi + hj - along - 0.5 * slope * turn
     hi, hj = (hi + turn * (hi1 + 0.5 * turn * hi2)) * inverse_i, (hj + turn * (hj1 + 0.5 * turn * hj2)) * inverse_j
-    hi1, hj1 = (hi1 + turn * hi2) * inverse_i, (hj1 + turn * hj2) * inverse_j
+    hi1, hj1 = hi1 + turn * hi2, hj1 + turn * hj2
     nx, ny = nx - turn * ny, ny + turn * nx
     scale = 1.5 - 0.5 * (nx * nx + ny * ny)
     nx, ny = nx * scale, ny * scale
+    # What one step of Newton's method leaves is shared out: so the normal forces keep the angular momentum whatever the turn.
+    left = 0.5 * (dy * nx - dx * ny - hi1 - hj1)
+    hi1, hj1 = (hi1 + left) * inverse_i, (hj1 + left) * inverse_j
     store(pairs.nx, k, nx)
     store(pairs.ny, k, ny)
     if outlines.enlarged:
@@ -225,6 +228,7 @@ def inner_ellipse_pairs(rows, outlines, lists, edges, skin, deepest):
             hi, _, _ = support(f[o], f[o + 1], f[o + 2], nx, ny)
             hj, _, _ = support(f[e], f[e + 1], f[e + 2], nx, ny)
             if dx * nx + dy * ny - hi - hj > skin:
+                lists.memory[k, 3] = lists.memory[k, 4] = 0.0  # a normal that nobody follows is none
                 continue
             nx, ny, gap = pair_gap(rows, outlines, i, j, lists.memory[k, 3], lists.memory[k, 4])
             lists.memory[k, 3], lists.memory[k, 4] = nx, ny

@@ -95,6 +95,37 @@ def push(rows, velocity, begin, end, kick, fx, fy, motion, dt):
 
 
 @kernel()
+def motions(rows, velocity, begin, end, thesis):
+    """Velocities that `push` begins with, (end - begin, 3)."""
+    out = np.empty((end - begin, 3))
+    for i in range(begin, end):
+        for c in range(3):
+            out[i - begin, c] = velocity[i, c] if thesis else rows[ROW * i + U + c]
+    return out
+
+
+@kernel()
+def drag_on_bonded(rows, old, pushed, begin, end, kick, fx, fy):
+    """What `push` could not know: energy lost to extra damping over kn [m^2] since bonds changed its velocities once more.
+
+    old, pushed (end - begin, 3): velocities before and after `push`; the drag acts over the mean of the old and the final ones.
+    """
+    lost = 0.0
+    for i in range(begin, end):
+        a = ROW * i
+        mobility = rows[a + MOBILITY]
+        if mobility == 0.0:
+            continue
+        turnable = rows[a + RATIO] * mobility
+        pushes = (mobility * rows[a + FX] + fx, mobility * rows[a + FY] + fy, turnable * rows[a + TURN])
+        for c in range(3):
+            inertia = 1.0 / turnable if c == 2 else 1.0 / mobility
+            drag = old[i - begin, c] + kick * pushes[c] - pushed[i - begin, c]
+            lost += inertia * drag * 0.5 * (rows[a + U + c] - pushed[i - begin, c])
+    return lost
+
+
+@kernel()
 def drift(rows, velocity, begin, end, thesis):
     """Positions of the grains begin..end-1 after a step with the velocities of `push`; forces are set to zero.
 

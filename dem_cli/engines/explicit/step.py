@@ -34,12 +34,40 @@ from dem_cli.engines.explicit.lists import (
     outer_lists,
     remember,
 )
-from dem_cli.engines.explicit.moves import LEAPFROG, THESIS, drift, let_go, mass_moved, move, push
+from dem_cli.engines.explicit.moves import (
+    LEAPFROG,
+    THESIS,
+    drag_on_bonded,
+    drift,
+    let_go,
+    mass_moved,
+    motions,
+    move,
+    push,
+)
 from dem_cli.geometry.lanes import WIDTH
 from dem_cli.jit import kernel
 
 # Entries of the ledger that the loop adds up [J]
 DASHPOT_N, DASHPOT_S, FRICTION, TIME_STEP, DAMPING, WORK, ESCAPED, BONDS, LEDGER = 0, 1, 2, 3, 4, 5, 6, 7, 8
+
+
+@kernel()
+def _kick_bonded(
+    rows, velocity, begin, end, first, last, kick, settle, fx, fy, motion, kn, dt, backward, ledger, bonds
+):  # fmt: skip
+    """New velocities of the elements begin..end-1 and of the bonds first..last-1 between them; settle: see `bodies.solve_bonds`."""
+    damped = motion.mass_damping > 0.0 or motion.local_damping > 0.0
+    old = pushed = np.empty((0, 3))
+    prepare_bonds(rows, bonds, first, last)
+    if damped:
+        old = motions(rows, velocity, begin, end, motion.integrator == THESIS)
+    ledger[DAMPING] += kn * push(rows, velocity, begin, end, kick, fx, fy, motion, dt)
+    if damped:
+        pushed = motions(rows, velocity, begin, end, False)
+    ledger[BONDS] += 0.5 * kn * solve_bonds(rows, bonds, first, last, kick, kn * dt, backward, settle)
+    if damped:
+        ledger[DAMPING] += kn * drag_on_bonded(rows, old, pushed, begin, end, kick, fx, fy)
 
 
 @kernel()
@@ -67,9 +95,9 @@ def _move_chunk(rows, velocity, begin, end, c, kick, fx, fy, motion, kn, dt, bac
             fastest, lost = move_pairs(rows, bonds, first, middle, kick, fx, fy, kn * dt)
             ledger[BONDS] += 0.5 * kn * lost
             first, begin = middle, begin + 2 * (middle - first)
-        prepare_bonds(rows, bonds, first, last)
-        ledger[DAMPING] += kn * push(rows, velocity, begin, end, kick, fx, fy, motion, dt)
-        ledger[BONDS] += 0.5 * kn * solve_bonds(rows, bonds, first, last, kick, kn * dt, backward)
+        _kick_bonded(
+            rows, velocity, begin, end, first, last, kick, True, fx, fy, motion, kn, dt, backward, ledger, bonds
+        )
         fastest = max(fastest, drift(rows, velocity, begin, end, thesis))
         follow_bonds(rows, bonds, first, last)
         return fastest
@@ -86,13 +114,12 @@ def _last_half_kick(rows, velocity, n, fx, fy, motion, kn, dt, backward, ledger,
         bodies = cores.start.size - 1
         gather_cores(rows, cores, 0, bodies)
         ledger[DAMPING] += kn * push(cores.rows, cores.velocity, 0, bodies, 0.5, fx, fy, motion, dt)
+    elif bonds is not None:
+        _kick_bonded(
+            rows, velocity, 0, n, 0, bonds.first.size, 0.5, False, fx, fy, motion, kn, dt, backward, ledger, bonds
+        )
     else:
-        if bonds is not None:
-            prepare_bonds(rows, bonds, 0, bonds.first.size)
         ledger[DAMPING] += kn * push(rows, velocity, 0, n, 0.5, fx, fy, motion, dt)
-        if bonds is not None:
-            lost = solve_bonds(rows, bonds, 0, bonds.first.size, 0.5, kn * dt, backward)
-            ledger[BONDS] += 0.5 * kn * lost
 
 
 @kernel()

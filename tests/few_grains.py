@@ -1,4 +1,4 @@
-"""A few discs between chosen walls, moved by the engine's own step: what the analytic tests start from."""
+"""A few grains between chosen walls, moved by the engine's own step: what many tests start from."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from dem_cli.engines.explicit.lists import FINE
 from dem_cli.engines.explicit.motion import Ground, Still
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.scenario import Scenario, parse_scenario
-from dem_cli.state import Floats, Frame, Grains, Walls
+from dem_cli.state import Bonds, Floats, Frame, Grains, Walls
 
 KN, KS = 1.0e6, 0.5e6  # N/m
 RADIUS, DENSITY = 0.01, 2500.0  # m, kg/m^3
@@ -99,12 +99,30 @@ def few_grains(
     gravity: (x, y) [m/s^2]; box: left, right, bottom beyond which grains have escaped [m]; changes: keys of the scenario with _ for
     the dot behind the table (contact_friction=0.3).
     """
-    model = scenario({key.replace("_", ".", 1): value for key, value in changes.items()})
     n = len(x)
     grains = Grains.discs(np.array(x), np.array(y), np.broadcast_to(radius, n).astype(float), DENSITY, 1.0)
     for name, value in (("vx", vx), ("vy", vy), ("spin", spin)):
         getattr(grains, name)[:] = value
-    state = ExplicitState.start_of(model, Assembly(grains, segments([]) if walls is None else walls), dt)
+    return bench_of(grains, dt=dt, walls=walls, gravity=gravity, ground=ground, box=box, **changes)
+
+
+def bench_of(
+    grains: Grains,
+    *,
+    dt: float,
+    walls: Walls | None = None,
+    bonds: Bonds | None = None,
+    rigid: bool = False,
+    gravity: Sequence[float] = (0.0, 0.0),
+    ground: Ground | None = None,
+    box: tuple[float, float, float] = (-1e6, 1e6, -1e6),
+    **changes: Any,
+) -> Bench:
+    """Any grains, see `few_grains`; rigid: those of several elements are clumps."""
+    model = scenario({key.replace("_", ".", 1): value for key, value in changes.items()})
+    walls = segments([]) if walls is None else walls
+    assembly = Assembly(grains, walls, Bonds.none() if bonds is None else bonds, rigid)
+    state = ExplicitState.start_of(model, assembly, dt)
     state.box = state.box._replace(left=box[0], right=box[1], bottom=box[2])
     state.first_forces()
     return Bench(state, np.array(gravity, dtype=float), Still() if ground is None else ground)
