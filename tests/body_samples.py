@@ -16,7 +16,11 @@ PAIR = ((-1.0, 0.0, 1.0), (1.0, 0.0, 1.0))
 UNEQUAL = ((-1.0, 0.0, 1.0), (0.6, 0.0, 0.6))
 TRIANGLE = ((-1.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, math.sqrt(3.0), 1.0))
 CHAIN = tuple((2.0 * k, 0.0, 1.0) for k in range(5))
-BENT = ((-2.0 * math.cos(0.5), 2.0 * math.sin(0.5), 1.0), (0.0, 0.0, 1.0), (2.0 * math.cos(0.3), 2.0 * math.sin(0.3), 1.0))
+BENT = (
+    (-2.0 * math.cos(0.5), 2.0 * math.sin(0.5), 1.0),
+    (0.0, 0.0, 1.0),
+    (2.0 * math.cos(0.3), 2.0 * math.sin(0.3), 1.0),
+)
 SINGLE = ((0.0, 0.0, 1.0),)
 
 Discs = Sequence[tuple[float, float, float]]

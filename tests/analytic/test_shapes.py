@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor
 from body_samples import BENT, PAIR, TRIANGLE, bodies, bonds_of, ellipses, set_in_motion
+from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor
 
 DT = math.pi * math.sqrt(MASS / KN) / 50
 
@@ -39,7 +39,9 @@ def test_elastic_drop_keeps_energy(ratio: float) -> None:
         errors.append(worst)
         assert bounces >= 6
         assert abs(frame.residual) < worst * start.energy.stored + 1e-12
-    print(f"ratio {ratio}: {bounces} bounces, error of the energy {errors} with the time step, half and a quarter of it")
+    print(
+        f"ratio {ratio}: {bounces} bounces, error of the energy {errors} with the time step, half and a quarter of it"
+    )
     assert errors[0] < 5e-3
     assert errors[2] < 0.3 * errors[0]
     assert np.abs(frame.grains.spin).max() > 1.0

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine_samples import box, last_frame
-from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor, run_for, segments
 from body_samples import (
     BENT,
     CHAIN,
@@ -25,13 +23,15 @@ from body_samples import (
     set_in_motion,
     swing,
 )
+from engine_samples import box, last_frame
+from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor, run_for, segments
 
 from dem_cli.assembly import Assembly
 from dem_cli.assembly.container import build_walls
 from dem_cli.engines.explicit import build
 from dem_cli.engines.explicit.bodies import BOND, MOMENT, PULL
-from dem_cli.engines.explicit.forces import MOBILITY, ROW
 from dem_cli.engines.explicit.engine import ExplicitEngine
+from dem_cli.engines.explicit.forces import MOBILITY, ROW
 from dem_cli.errors import RunError
 from dem_cli.state import Bonds, Floats, Grains
 
@@ -122,7 +122,9 @@ def test_any_viscosity_is_stable(viscosity: float, shape: str) -> None:
         assert bench.steps(25) == 0
         frame = bench.frame()
         energy = frame.energy.stored - frame.energy.time_step
-        assert energy < last + 1e-3 * start.energy.stored  # in a contact of fifty steps the springs' share is right to this
+        assert (
+            energy < last + 1e-3 * start.energy.stored
+        )  # in a contact of fifty steps the springs' share is right to this
         last = energy
         assert abs(frame.residual) < 1e-3 * frame.energy_in
     assert frame.energy.bonds > -2e-5 * frame.energy_in
@@ -214,7 +216,11 @@ def test_dashpot_slows_by_its_own_rate(direction: str) -> None:
     """A soft dashpot: the relative motion of a free pair falls as exp(-C t/m_eff), and the others do nothing."""
     rate = 20.0  # 1/s
     none, inertia = 1e-280, 0.5 * MASS * RADIUS**2
-    effective = {"normal": 0.5 * MASS, "tangential": 1.0 / (2.0 / MASS + 2.0 * RADIUS**2 / inertia), "rolling": 0.5 * inertia}
+    effective = {
+        "normal": 0.5 * MASS,
+        "tangential": 1.0 / (2.0 / MASS + 2.0 * RADIUS**2 / inertia),
+        "rolling": 0.5 * inertia,
+    }
     grains = bodies([PAIR], [0.0], [0.0])
     if direction == "rolling":
         grains.spin[:] = (5.0, -5.0)
@@ -259,7 +265,9 @@ def test_calls_do_not_matter(shape: Any, every: int) -> None:
 # -- four pairs at a time ----------------------------------------------------------------------------------------------
 
 
-def five_pairs(shapes: list[Any], where: slice = slice(None), box: tuple[float, float, float] = (-1e6, 1e6, -1e6)) -> Bench:
+def five_pairs(
+    shapes: list[Any], where: slice = slice(None), box: tuple[float, float, float] = (-1e6, 1e6, -1e6)
+) -> Bench:
     """Some of five different pairs, far from each other, that fall on a floor."""
     places = np.arange(5) * 1.0
     turned, speed = np.array([0.3, -0.5, 1.1, 0.0, 2.0]), np.array([0.4, -0.2, 0.3, 0.1, -0.6])
@@ -337,7 +345,9 @@ def heap(viscosity: float, rolling: float, **changes: Any) -> Bench:
     grains = heap_grains()
     walls = segments([(-0.1, 0.0, 0.1, 0.0), (-0.1, 0.0, -0.1, 2.0), (0.1, 0.0, 0.1, 2.0)], 0.4)
     settings = {"contact_friction": 0.4, "contact_damping_ratio": 0.2, **changes}
-    return bench_of(grains, bonds=bonds_of(grains, viscosity, rolling), dt=DT, walls=walls, gravity=(0.0, -G), **settings)
+    return bench_of(
+        grains, bonds=bonds_of(grains, viscosity, rolling), dt=DT, walls=walls, gravity=(0.0, -G), **settings
+    )
 
 
 @pytest.mark.parametrize("viscosity", [1e4, 1e6, 1e8])
@@ -355,7 +365,9 @@ def test_templates_keep_their_shape(viscosity: float) -> None:
         for pairs in worst:
             here = (bonded[bench.state.body_id[bonds_of(heap_grains(), 1.0).i]] == 1) == pairs
             worst[pairs] = max(worst[pairs], most[here].max())
-    print(f"C = {viscosity:g} N s/m: strain of bonds of pairs up to {worst[True]:.1e}, of longer bodies {worst[False]:.1e}")
+    print(
+        f"C = {viscosity:g} N s/m: strain of bonds of pairs up to {worst[True]:.1e}, of longer bodies {worst[False]:.1e}"
+    )
     assert worst[True] < max(3e3 / viscosity, 1e-3)
     assert worst[False] < max(3e3 / viscosity, 0.1)
     assert len(bench.state.contacts()) > 5
@@ -513,7 +525,9 @@ def test_sorting_in_the_middle() -> None:
 
 def test_blow_up_names_grains_not_discs() -> None:
     """A body that goes through another is named by the number of the grain, which all its discs share."""
-    grains = set_in_motion(bodies([PAIR, TRIANGLE, PAIR], [0.1, 0.2, 0.3], [0.1, 0.1, 0.1]), vx=np.array([0.0, 90.0, -90.0]))
+    grains = set_in_motion(
+        bodies([PAIR, TRIANGLE, PAIR], [0.1, 0.2, 0.3], [0.1, 0.1, 0.1]), vx=np.array([0.0, 90.0, -90.0])
+    )
     scenario = box({"container.width": "40 cm"})
     engine = ExplicitEngine(scenario, Assembly(grains, build_walls(scenario), bonds_of(grains, 1e5)))
     with pytest.raises(RunError, match=r"grain (1 and grain 2|2 and grain 1) overlap by"):

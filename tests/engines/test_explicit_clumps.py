@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from engine_samples import box, engine_of
-from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor, run_for, segments
 from body_samples import (
     BENT,
     CHAIN,
@@ -28,6 +26,8 @@ from body_samples import (
     sums,
     swing,
 )
+from engine_samples import box, engine_of
+from few_grains import KN, MASS, RADIUS, Bench, G, bench_of, floor, run_for, segments
 
 from dem_cli.assembly import Assembly
 from dem_cli.assembly.container import build_walls
@@ -229,7 +229,9 @@ def test_discs_of_one_clump_do_not_touch() -> None:
 @EACH
 def test_clump_leaves_as_a_whole(shape: Any) -> None:
     """It is out once its last disc is, and the energy that it had is in the ledger."""
-    grains = set_in_motion(bodies([shape, SINGLE], [0.0, -0.5], [0.0, 0.0], [0.7, 0.0]), vx=np.array([1.0, 0.0]), spin=3.0)
+    grains = set_in_motion(
+        bodies([shape, SINGLE], [0.0, -0.5], [0.0, 0.0], [0.7, 0.0]), vx=np.array([1.0, 0.0]), spin=3.0
+    )
     bench = bench_of(grains, rigid=True, dt=DT, box=(-1.0, 0.05, -1.0))
     brought = 0.5 * (grains.mass * (grains.vx**2 + grains.vy**2) + grains.inertia * grains.spin**2)[:-1].sum()
     first = None
@@ -329,5 +331,3 @@ def test_sorting_in_the_middle() -> None:
     for name in ("x", "y", "angle", "vx", "vy"):
         np.testing.assert_allclose(getattr(b.grains, name), getattr(a.grains, name), rtol=0, atol=1e-9)
     assert (a.contacts.i.tolist(), a.contacts.j.tolist()) == (b.contacts.i.tolist(), b.contacts.j.tolist())
-
-

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from body_samples import angular_momentum, ellipses, momentum, swing, wrenches
 from engine_samples import box, engine_of, last_frame, loose_grains, resultants
 from few_grains import KN, MASS, RADIUS, Bench, bench_of, few_grains, segments
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from body_samples import angular_momentum, ellipses, momentum, swing, wrenches
 
 from dem_cli.assembly.container import build_walls
 from dem_cli.engines.explicit import build
@@ -237,7 +237,8 @@ def test_one_step_of_newton_follows_the_normal() -> None:
     assert np.count_nonzero(force[:, 0]) == 400
     for s in range(20, 400, 20):
         one, two = (
-            outline(a, b, angle) for a, b, angle in zip(grains.a, grains.b, grains.angle + (s + 1) * dt * grains.spin, strict=True)
+            outline(a, b, angle)
+            for a, b, angle in zip(grains.a, grains.b, grains.angle + (s + 1) * dt * grains.spin, strict=True)
         )
         nx, ny, gap = widest_gap(grains.x[1] - grains.x[0], grains.y[1] - grains.y[0], *one, *two, 0.0, 0.0)
         np.testing.assert_allclose(force[s, :2], [gap * nx, gap * ny], rtol=0, atol=1e-12 * RADIUS)
@@ -408,7 +409,9 @@ def test_grains_that_go_through_each_other_are_named() -> None:
         grains = loose_ellipses(12, 4, 2.0)
         grains.x[left], grains.x[right], grains.y[left], grains.y[right] = 0.10, 0.14, 0.25, 0.25
         grains.vx[left], grains.vx[right] = 40.0, -40.0
-        with pytest.raises(RunError, match=rf"grain ({left} and grain {right}|{right} and grain {left}) overlap by 0\.\d"):
+        with pytest.raises(
+            RunError, match=rf"grain ({left} and grain {right}|{right} and grain {left}) overlap by 0\.\d"
+        ):
             last_frame(engine_of(walled(), grains))
 
 

@@ -271,7 +271,9 @@ def test_face_of_a_wall(ellipse, normal, gap, wall, place):
     n, seen = to_wall(ellipse, ends, 7.0 * np.array([math.cos(place), math.sin(place)]))
     scale = ellipse[0] * (before + after) + 7.0
     assert seen == pytest.approx(gap, abs=1e-14 * scale)
-    np.testing.assert_allclose(n, [math.cos(normal), math.sin(normal)], rtol=0, atol=1e-13 * scale / min(ellipse[0], 1.0))
+    np.testing.assert_allclose(
+        n, [math.cos(normal), math.sin(normal)], rtol=0, atol=1e-13 * scale / min(ellipse[0], 1.0)
+    )
     assert seen == pytest.approx(widest_to_wall(ellipse, ends), abs=1e-12 * scale)
 
 

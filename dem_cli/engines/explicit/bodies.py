@@ -119,7 +119,9 @@ def _settled(motion, geometry, inertia, share, give, forces):
 def _losses(impulses, before, after):
     """Twice the energy over kn that a bond takes from a motion: its forces over the step times the mean of the motions before and after."""
     return (
-        impulses[0] * (before[0] + after[0]) + impulses[1] * (before[1] + after[1]) + impulses[2] * (before[2] + after[2])
+        impulses[0] * (before[0] + after[0])
+        + impulses[1] * (before[1] + after[1])
+        + impulses[2] * (before[2] + after[2])
     )
 
 
