@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import report_samples as made
@@ -122,6 +123,18 @@ def test_incomplete_runs(tmp_path: Path) -> None:
         assert math.isnan(early.measures["void_ratio_packed"])
         assert math.isnan(early.measures["speed"])
         assert pool([early])[0][0].measures["void_ratio_packed"].n == 0
+
+
+def test_without_shaking_the_end_is_that_of_the_packing(tmp_path: Path) -> None:
+    path = a_file(tmp_path / "run.h5", scenario=(('kind = "shake"', 'kind = "run"'),))
+    with h5py.File(path, "a") as file:
+        file["stages/kind"][1] = "run"
+    found = read(path)
+    assert found.shaking_label == "none"
+    assert found.measures["void_ratio_packed"] == pytest.approx(made.VOID_RATIOS[2])
+    assert math.isnan(found.measures["void_ratio_shaken"])
+    assert found.moved == ()
+    assert pool([found])[0][0].sine is None
 
 
 # -------------------------------------------------------------------------------- tracked grains

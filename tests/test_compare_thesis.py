@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from compare_samples import an_outcome, ways
 
@@ -174,6 +176,9 @@ def test_surfaces_of_discs_and_pairs(sine: tuple[int, int]) -> None:
 
 def test_incomplete_runs_are_in_no_statement() -> None:
     assert checked(*(an_outcome(f, complete=False) for f in FAMILIES)) == []
+    runs = grid({**MILD, (1200, 1): 20.0})
+    assert [c for c in checked(*runs) if c.source == "8.9.1"]
+    assert checked(*(replace(run, complete=False) for run in runs)) == []
 
 
 def test_what_is_not_covered_is_said() -> None:
@@ -188,8 +193,6 @@ def test_where_runs_differ_in_size_is_said() -> None:
     same = why(pool([an_outcome("disc", overlap=2e-4), an_outcome("pair", overlap=1e-4)])[0])
     assert not any("Size of these samples" in line for line in same)
     assert "2.0e-04" in same[-1]
-    from dataclasses import replace
-
     small = why(pool([replace(an_outcome("disc"), grains=300)])[0])
     assert any("300 discs in 1.215 m (thesis: 3000 in 1.215 m)" in line for line in small)
     assert why(pool([an_outcome(complete=False)])[0]) == []

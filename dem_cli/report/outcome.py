@@ -172,7 +172,7 @@ def _measures(results: Results, found: Summary) -> dict[str, float]:
         packed, last = stages[shaken[0]].before, stages[-1].after or _last_row(results)
     else:
         # Without shaking the end is that of the packing, if it came to it.
-        packed, last = stages[-1].after if stages and results.complete else {}, {}
+        packed, last = stages[-1].after if stages else {}, {}
     known = {}
     for name, stored in ENDS.items():
         known[f"{name}_packed"] = packed.get(stored, math.nan)
