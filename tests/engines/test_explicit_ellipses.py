@@ -73,7 +73,7 @@ def test_discs_as_ellipses(settled: bool, settled_box: Callable[[int, int], Grai
     grains = settled_box(60, 1) if settled else loose_grains(60, seed=5, width=0.16, speed=0.4)
     one, two = engine_of(scenario, grains), engine_of(scenario, grains)
     as_ellipses(two.state)
-    field = np.tile(one.gravity + (2.0, 0.0), (401 if settled else 251, 1))
+    field = np.tile(one.gravity + np.array([2.0, 0.0]), (401 if settled else 251, 1))
     for engine in (one, two):
         engine.state.first_forces()
         engine.state.advance(engine.time_step, field, NOTHING)
