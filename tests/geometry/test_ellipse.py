@@ -188,6 +188,7 @@ def test_the_other_way_round(one, two, normal, gap):
 
 
 @some
+@example((5.0, 1.0, 0.0), (5.0, 1.0, 0.5), 1.5, 1e-3, 5.5)  # a false maximum lies near
 @given(ellipses, ellipses, angles, st.one_of(gaps, depths.map(lambda depth: -depth)), angles)
 def test_any_start(one, two, normal, gap, start):
     """A direction to begin with, however wrong, changes nothing; where they overlap it must lie within 90 degrees."""
@@ -278,6 +279,13 @@ def test_face_of_a_wall(ellipse, normal, gap, wall, place):
 
 
 @some
+@example(
+    (5.0, 1.0, 6.0), 1.5, 0.0, 1.0, (1.0, 1.0, False, False)
+)  # beyond the wall's line the outline lies beside the wall
+@example((5.0, 1.0, 6.0), 1.5, -0.01, 1.0, (1.0, 1.0, True, False))
+@example((5.0, 1.0, 0.5), 4.7, 0.3, 1.5, (1.0, 20.0, False, False))  # nearly along the wall, the centre beside it
+@example((5.0, 1.0, 0.5), 4.7, 0.3, -1.5, (1.0, 20.0, False, False))
+@example((5.0, 1.0, -0.5), 4.7, 0.3, 1.5, (1.0, 20.0, True, False))
 @given(ellipses, angles, st.one_of(gaps, depths.map(lambda depth: -depth)), st.floats(-1.5, 1.5), walls_of)
 def test_end_of_a_wall(ellipse, normal, gap, lean, wall):
     """A wall whose end is what is nearest: it leads away from a point in front of the ellipse at some slant."""
