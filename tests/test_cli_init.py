@@ -140,7 +140,7 @@ def test_short_help_is_that_of_the_commands() -> None:
         (["check", "--help"], set()),
         (["init"], {"numpy", "pydantic"}),
     ],
-    ids=str,
+    ids=lambda value: " ".join(sorted(value)),
 )
 def test_light_commands_import_nothing_heavy(arguments: list[str], allowed: set[str]) -> None:
     code = (
