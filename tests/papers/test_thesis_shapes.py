@@ -17,8 +17,8 @@ from dem_cli.scenario.shipped import folder
 
 SEEDS = range(1, 6)
 SMALLER = (
-    "container.width=40.5 cm", "contact.damping_ratio=0.3", "stage.shake.duration=1 s", "stage.1.unbalanced=1e-3",
-    "stage.3.unbalanced=1e-3", "output.interval=0.05 s", "output.frames=10 s", "output.tracks.grains=[0]",
+    "container.width=40.5 cm", "contact.damping_ratio=0.3", "stage.shake.duration=1 s", "stage.1.unbalanced=3e-3", "stage.1.kinetic=1e-4",
+    "stage.3.unbalanced=3e-3", "stage.3.kinetic=1e-4", "output.interval=0.02 s", "output.frames=10 s", "output.tracks.grains=[0]",
 )  # fmt: skip
 CASES = {
     "ellipse": ("thesis-ellipses-400gal-10hz", ("grains.count=300", "packing.grid.columns=13")),
