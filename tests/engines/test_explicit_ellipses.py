@@ -23,6 +23,7 @@ from dem_cli.state import Floats, Grains
 
 DT = math.pi * math.sqrt(MASS / KN) / 50
 NOTHING = np.zeros((0, 2))
+EVERY = 5
 
 
 def as_ellipses(state: ExplicitState) -> None:
@@ -142,11 +143,14 @@ def test_energy_of_a_glancing_pair_is_of_second_order() -> None:
 # -- forces do not jump ------------------------------------------------------------------------------------------------
 
 
-def turning(bench: Bench, steps: int) -> Floats:
-    """Force and turn (x, y, moment over the radius) on element 0 over kn at each step, (steps, 3) [m]."""
-    out = np.empty((steps, 3))
-    for s in range(steps):
-        assert bench.steps(1) == 0
+def turning(bench: Bench, looks: int) -> Floats:
+    """Force and turn (x, y, moment over the radius) on element 0 over kn after every EVERY steps, (looks, 3) [m].
+
+    In the first step of a call normals are searched anew; the later ones follow them.
+    """
+    out = np.empty((looks, 3))
+    for s in range(looks):
+        assert bench.steps(EVERY) == 0
         out[s] = bench.state.rows[0, [FX, FY, TURN]]
     return out
 
@@ -168,7 +172,7 @@ def test_force_of_a_turning_contact_is_continuous(ratio: float, other: str) -> N
     a, b = RADIUS * math.sqrt(ratio), RADIUS / math.sqrt(ratio)
     spin, distance = 40.0, 0.5 * (a + b) + RADIUS
     for steps in (2000, 4000):
-        dt = 2.0 * math.pi / spin / steps
+        dt = 2.0 * math.pi / spin / (EVERY * steps)
         if other == "end of a wall":
             # Within b^2/a of the tip, else two sides compete.
             grains, walls = ellipses([0.0], [0.0], ratio, 0.2), segments([(a - 0.1 * b, 0.1 * b, 3.0 * a, -a)])
@@ -189,7 +193,7 @@ def test_force_of_a_turning_contact_is_continuous(ratio: float, other: str) -> N
 
 def compare_with_no_history(grains: Grains, walls: Any, dt: float, force: Floats) -> None:
     for s in range(0, len(force), 7):
-        angle = grains.angle + (s + 1) * dt * grains.spin
+        angle = grains.angle + EVERY * (s + 1) * dt * grains.spin
         shapes = [outline(*each) for each in zip(grains.a, grains.b, angle, strict=True)]
         if walls is None:
             dx, dy = grains.x[1] - grains.x[0], grains.y[1] - grains.y[0]
@@ -198,20 +202,22 @@ def compare_with_no_history(grains: Grains, walls: Any, dt: float, force: Floats
             ends = (float(w[0]) for w in (walls.x0, walls.y0, walls.x1, walls.y1))
             nx, ny, gap = wall_gap(grains.x[0], grains.y[0], *shapes[0], *ends)
         push = max(-gap, 0.0)
-        np.testing.assert_allclose(force[s, :2], [-push * nx, -push * ny], rtol=0, atol=1e-6 * RADIUS)
+        # Half a milliradian a step, and the normal up to five times that: its error is of the second order, that of the overlap smaller.
+        assert math.hypot(force[s, 0], force[s, 1]) == pytest.approx(push, abs=1e-8 * RADIUS)
+        np.testing.assert_allclose(force[s, :2], [-push * nx, -push * ny], rtol=0, atol=1e-5 * push + 1e-8 * RADIUS)
 
 
-@pytest.mark.parametrize(("spin", "close"), [(3.0, 1e-12), (30.0, 1e-8)])
+@pytest.mark.parametrize(("spin", "close"), [(3.0, 1e-12), (30.0, 1e-10)])
 def test_one_step_of_newton_follows_the_normal(spin: float, close: float) -> None:
     """At the speeds of a run the remembered normal, bettered by one step of Newton's method a step, gives the overlap to rounding."""
     angle = np.array([1.2, 1.9])
     grains = ellipses([0.0, 1.4 * RADIUS], [0.0, 0.3 * RADIUS], 3.0, angle)
     grains.spin[:] = (spin, -0.7 * spin)
     dt = DT / 4.0
-    force = turning(held(grains, dt=dt), 400)
-    assert np.count_nonzero(force[:, 0]) > 250
-    for s in range(20, 400, 20):
-        turned = grains.angle + (s + 1) * dt * grains.spin
+    force = turning(held(grains, dt=dt), 80)
+    assert np.count_nonzero(force[:, 0]) > 50
+    for s in range(4, 80, 4):
+        turned = grains.angle + EVERY * (s + 1) * dt * grains.spin
         one, two = (outline(*each) for each in zip(grains.a, grains.b, turned, strict=True))
         nx, ny, gap = widest_gap(grains.x[1] - grains.x[0], grains.y[1] - grains.y[0], *one, *two, 0.0, 0.0)
         push = max(-gap, 0.0)
