@@ -7,8 +7,13 @@ from functools import cache
 
 import pytest
 from engine_samples import settle
+from hypothesis import settings
 
 from dem_cli.state import Grains
+
+# the same examples in every run; `--hypothesis-profile=default` draws new ones
+settings.register_profile("repeatable", derandomize=True, print_blob=True)
+settings.load_profile("repeatable")
 
 SettledBox = Callable[[int, int], Grains]
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from analysis_samples import bodies_of, discs, ellipses, rotated, touching, union_in_rectangle
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from dem_cli.analysis.bodies import areas
@@ -127,6 +127,8 @@ def test_touching_discs_and_ellipses_against_slices(seed, u, v, w, h):
             low, high = (middle, high) if len(touching(pair)) else (low, middle)
         x[k] = x[k - 1] + high - 0.01 * min(b[k - 1], b[k])
     grains = ellipses(x, y, a, b, angle)
+    # two tall ones may meet across a small one between them, deep in each other
+    assume(touching(grains).overlap.max() <= 0.01)
     window = window_within(grains, u, v, w, h)
     reference = union_in_rectangle(grains, window)
     assert solids(grains, window) == pytest.approx(reference, abs=2e-4 * window.area)
