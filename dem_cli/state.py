@@ -230,3 +230,85 @@ class Frame:
     stage_end: bool = False
     stop_reason: str = ""
     warnings: tuple[str, ...] = field(default=())
+
+
+@dataclass(frozen=True)
+class Slips:
+    """Contacts that dissipated energy in one increment of a quasi-static test, shape (s,) each.
+
+    i, j as in `Contacts`; they may have opened since. energy [J]: lost to friction in this increment.
+    """
+
+    i: Ints
+    j: Ints
+    energy: Floats
+
+    def __len__(self) -> int:
+        return len(self.i)
+
+
+@dataclass(frozen=True)
+class QuasiStaticEnergy:
+    """Ledger of a quasi-static test in joules, all counted from the start of the run.
+
+    work: done by the boundary (walls, chains, membrane pressure) on the grains, compression > 0; body_work: by gravity.
+    Stored now: elastic_normal, elastic_tangential, elastic_membrane. friction: dissipated by sliding, >= 0.
+    released: energy that collapses have set free, which a quasi-static method has no inertia to hold.
+    Balance: work + body_work = change of what is stored + friction + released + residual.
+    """
+
+    work: float = 0.0
+    body_work: float = 0.0
+    elastic_normal: float = 0.0
+    elastic_tangential: float = 0.0
+    elastic_membrane: float = 0.0
+    friction: float = 0.0
+    released: float = 0.0
+    residual: float = 0.0
+
+    @property
+    def stored(self) -> float:
+        return self.elastic_normal + self.elastic_tangential + self.elastic_membrane
+
+
+@dataclass(frozen=True)
+class Increment:
+    """The sample in equilibrium after one increment of a quasi-static test, made by an engine and read by measures and writers.
+
+    number: increments done since the start of the run, 0 the start; stage (0-based); in_stage: increments done in the stage.
+    grains: the last `boundary` of its elements are chains of boundary grains; they belong to no measure of the grains.
+    walls: where they are now. width, height [m]: mean inner size; area [m^2]: of the sample, inside walls or chains.
+    stress (2,) [Pa]: on the boundaries across x and y, compression > 0, the effective one where pores are closed; strain (2,): of width and
+    height against their size at the start of the shearing, compression > 0; pore_pressure [Pa], NaN where pores are drained.
+    slips: what slid in this increment. balance [N]: largest fixing force that is left (Kishino (14)); iterations, sub_steps: of this increment;
+    rung: highest step of the ladder of fallbacks that was needed, 0 for none; event: the increment passed through a collapse.
+    axial: 1 where the prescribed compression is along y, 0 along x. unbalanced [-]: mean resultant force on a grain over mean contact force.
+    """
+
+    number: int
+    stage: int
+    in_stage: int
+    grains: Grains
+    walls: Walls
+    contacts: Contacts
+    slips: Slips
+    width: float
+    height: float
+    area: float
+    stress: Floats
+    strain: Floats
+    energy: QuasiStaticEnergy
+    boundary: int = 0
+    pore_pressure: float = float("nan")
+    axial: int = 1
+    balance: float = 0.0
+    unbalanced: float = 0.0
+    iterations: int = 0
+    sub_steps: int = 0
+    rung: int = 0
+    event: bool = False
+    due: frozenset[str] = frozenset()
+    stage_start: bool = False
+    stage_end: bool = False
+    stop_reason: str = ""
+    warnings: tuple[str, ...] = field(default=())

@@ -64,6 +64,72 @@ SERIES: dict[str, tuple[str, str]] = {
     "ground_ay": ("m/s^2", "acceleration of the container"),
 }
 
+# Series of a quasi-static test, over its increments. Indices 1 and 2 are the axial and the lateral direction of the stage ("axial", usually y, and the other).
+INCREMENTS: dict[str, tuple[str, str]] = {
+    "increment": ("1", "number of increments done, 0 the start"),
+    "stage": ("1", "number of the stage, from 0"),
+    "in_stage": ("1", "number of increments done in the stage"),
+    "axial": ("1", "axial direction: 0 is x, 1 is y"),
+    "strain_x": ("1", "strain of the width against that at the start of the shearing, compression > 0"),
+    "strain_y": ("1", "strain of the height against that at the start of the shearing, compression > 0"),
+    "shear_strain": ("1", "e1 - e2, axial less lateral strain"),
+    "volumetric_strain": ("1", "1 - area over that at the start of the shearing, contraction > 0"),
+    "stress_x": ("Pa", "stress on the boundaries across x, compression > 0; effective where pores are closed"),
+    "stress_y": ("Pa", "stress on the boundaries across y, compression > 0; effective where pores are closed"),
+    "mean_stress": ("Pa", "(s1 + s2)/2"),
+    "deviator": ("Pa", "s1 - s2, axial less lateral stress"),
+    "stress_ratio": ("1", "s1/s2, axial over lateral stress"),
+    "sine": ("1", "(s1 - s2)/(s1 + s2), the sine of the mobilised friction angle"),
+    "pore_pressure": ("Pa", "pressure of the pore water, NaN where pores are drained"),
+    "width": ("m", "mean inner width"),
+    "height": ("m", "mean inner height"),
+    "void_ratio": ("1", "voids over solids inside the boundaries, overlaps of grains counted once"),
+    "porosity": ("1", "voids over total inside the boundaries"),
+    "contacts": ("1", "number of contacts that carry force"),
+    "coordination": ("1", "trace of the coordination tensor: contacts per grain, each counted for both of its grains"),
+    "coordination_xx": ("1", "coordination tensor, Kishino (23)"),
+    "coordination_xy": ("1", "coordination tensor, Kishino (23)"),
+    "coordination_yy": ("1", "coordination tensor, Kishino (23)"),
+    "rattlers": ("1", "grains with fewer than two contacts"),
+    "sliding": ("1", "share of contacts at the friction limit"),
+    "fabric_xx": ("1", "fabric tensor <n n> of contacts between grains"),
+    "fabric_xy": ("1", "fabric tensor <n n> of contacts between grains"),
+    "fabric_yy": ("1", "fabric tensor <n n> of contacts between grains"),
+    "energy_xx": ("J/m^3", "elastic energy tensor, Kishino (24)"),
+    "energy_xy": ("J/m^3", "elastic energy tensor, Kishino (24)"),
+    "energy_yy": ("J/m^3", "elastic energy tensor, Kishino (24)"),
+    "branch_stress_xx": ("Pa", "sum of contact force x branch vector over the area: a check of stress_x"),
+    "branch_stress_xy": ("Pa", "the same, symmetric part"),
+    "branch_stress_yy": ("Pa", "the same, a check of stress_y"),
+    "max_overlap": ("1", "largest overlap over the smaller radius of the two bodies"),
+    "work": ("J", "work of the boundary on the grains since the start"),
+    "body_work": ("J", "work of gravity since the start"),
+    "elastic_normal": ("J", "energy of normal springs"),
+    "elastic_tangential": ("J", "energy of tangential springs"),
+    "elastic_membrane": ("J", "energy of the links of membranes"),
+    "friction": ("J", "dissipated by sliding since the start, Kishino (25)-(29)"),
+    "released": ("J", "set free by collapses since the start"),
+    "residual": ("J", "energy that the ledger cannot account for"),
+    "largest_share": (
+        "1",
+        "share of the contact that dissipates most in the dissipation of the increment, NaN without any",
+    ),
+    "event": ("1", "1 where the increment passed through a collapse"),
+    "balance": ("N", "largest fixing force that is left, Kishino (14)"),
+    "unbalanced": ("1", "mean resultant force on a grain over mean contact force"),
+    "iterations": ("1", "iterations of the increment"),
+    "sub_steps": ("1", "sub-steps of the increment"),
+    "rung": ("1", "highest fallback of the solver that was needed, 0 for none"),
+}
+# The contacts that dissipate most, over /dissipation/increment and /dissipation/rank, sorted; NaN (-1 for bodies) beyond the last.
+DISSIPATION: dict[str, tuple[str, str]] = {
+    "i": ("1", "number of the first element"),
+    "j": ("1", "number of the other element, -1 - w for wall w"),
+    "energy": ("J", "dissipated in this increment"),
+    "share": ("1", "share in the dissipation of all contacts in this increment"),
+}
+RANKS = 20
+
 # Tracks of chosen discs and ellipses over /tracks/time, shape (times, elements), in the container's frame.
 TRACKS: dict[str, tuple[str, str]] = {
     "x": ("m", "position"),
