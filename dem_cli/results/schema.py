@@ -64,7 +64,7 @@ SERIES: dict[str, tuple[str, str]] = {
     "ground_ay": ("m/s^2", "acceleration of the container"),
 }
 
-# Series of a quasi-static test, over its increments. Indices 1 and 2 are the axial and the lateral direction of the stage ("axial", usually y, and the other).
+# Series of a quasi-static test, over its increments. 1 and 2 are the axial direction of the stage ("axial", usually y) and the lateral one.
 INCREMENTS: dict[str, tuple[str, str]] = {
     "increment": ("1", "number of increments done, 0 the start"),
     "stage": ("1", "number of the stage, from 0"),
