@@ -1,0 +1,340 @@
+"""Contacts of the granular element method: forces, contact stiffness and what sliding dissipates (Kishino 1988, section 2).
+
+Bodies are discs; x (n, 3) holds their centre and r times their turn [m], so that all three have one unit. Grains come first, boundary grains (chains,
+membranes) last. The fixing force F (n, 3) [N] of a disc is what would hold it at rest: F = sum T' P - B (5), its third part the moment over r.
+Four walls stand around a fixed centre; `box` is (centre x, centre y, half width, half height) [m].
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from dem_cli.geometry.cells import carry_memory, neighbour_list
+from dem_cli.jit import kernel
+
+# free; moved with the box; of a membrane: free but not to turn, and, next to a wall, free along x only
+GRAIN, DRIVEN, MEMBRANE, TIED = 0, 1, 2, 3
+# Columns of the memory of a contact: shear and normal force where the slider starts from ("anchor"), the same at the start of the
+# sub-step, and the energy that sliding has cost in it [J].
+SHEAR, NORMAL, STEP_SHEAR, STEP_NORMAL, LOST, COLUMNS = 0, 1, 2, 3, 4, 5
+LEFT, RIGHT, BOTTOM, TOP = 0, 1, 2, 3
+# Sums over the boundary: force times arm about the centre along x and y [N m], their stiffness against strain [N m], force on both walls
+# across x and across y [N], smallest gap at these walls [m], contacts that opened or closed since the last look.
+XX, YY, STIFF_X, STIFF_Y, WALL_X, WALL_Y, GAP_X, GAP_Y, FLIPS, SUMS = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+
+
+class Bodies(NamedTuple):
+    """radius (n,) [m]; load (n, 2) [N]: body force; kind (n,); grains: number of free grains, which come first."""
+
+    radius: np.ndarray
+    load: np.ndarray
+    kind: np.ndarray
+    grains: int
+
+
+class Law(NamedTuple):
+    """kn, kt [N/m]; friction [-] and cohesion [N] between grains, wall_friction (4,) [-]; wall (4,) bool: which walls there are."""
+
+    kn: float
+    kt: float
+    friction: float
+    cohesion: float
+    wall_friction: np.ndarray
+    wall: np.ndarray
+
+
+class Near(NamedTuple):
+    """Contacts that may come to touch while no disc moves more than half a skin, and their forces at the last look.
+
+    start, neighbour: half list; first, second (m,): the same as pairs; memory (m, COLUMNS); normal, shear [N], slip [m] (m,): slip is what
+    the slider has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made.
+    """
+
+    start: np.ndarray
+    neighbour: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    memory: np.ndarray
+    normal: np.ndarray
+    shear: np.ndarray
+    slip: np.ndarray
+    disc: np.ndarray
+    side: np.ndarray
+    wall_memory: np.ndarray
+    wall_normal: np.ndarray
+    wall_shear: np.ndarray
+    wall_slip: np.ndarray
+    place: np.ndarray
+    box: np.ndarray
+
+
+@kernel()
+def no_list(n):
+    """The list of n discs before the first look."""
+    ints, floats, memory = np.zeros(0, np.int32), np.zeros(0), np.zeros((0, COLUMNS))
+    return Near(
+        np.zeros(n + 1, np.int64), ints, ints, ints, memory, floats, floats, floats, ints, ints, memory, floats, floats, floats,
+        np.full((n, 2), np.inf), np.zeros(4),
+    )  # fmt: skip
+
+
+@kernel(inline=True)
+def wall_of(side, box):
+    """Unit normal of a wall (outward) and its distance from the origin along it: nx, ny, place."""
+    if side == LEFT:
+        return -1.0, 0.0, box[2] - box[0]
+    if side == RIGHT:
+        return 1.0, 0.0, box[0] + box[2]
+    if side == BOTTOM:
+        return 0.0, -1.0, box[3] - box[1]
+    return 0.0, 1.0, box[1] + box[3]
+
+
+@kernel()
+def renew(x, bodies, law, box, skin, old):
+    """The list at the present places, with the memory and forces of the old one. Pairs of boundary grains are left out."""
+    n = bodies.radius.size
+    start, neighbour = neighbour_list(x[:, 0].copy(), x[:, 1].copy(), bodies.radius, np.ones(n, np.bool_), skin)
+    if bodies.grains < n:
+        kept, count = np.empty_like(neighbour), 0
+        for i in range(n):
+            low, high = start[i], start[i + 1]
+            start[i] = count
+            for k in range(low, high):
+                if i < bodies.grains or neighbour[k] < bodies.grains:
+                    kept[count] = neighbour[k]
+                    count += 1
+        start[n] = count
+        neighbour = kept[:count].copy()
+    m = neighbour.size
+    first = np.empty(m, np.int32)
+    for i in range(n):
+        first[start[i] : start[i + 1]] = i
+    carried = np.empty((old.first.size, COLUMNS + 1))
+    carried[:, :COLUMNS], carried[:, COLUMNS] = old.memory, old.normal
+    carried = carry_memory(old.start, old.neighbour, carried, start, neighbour)
+
+    disc, side = [np.int32(0) for _ in range(0)], [np.int32(0) for _ in range(0)]
+    for i in range(n):
+        for w in range(4):
+            nx, ny, place = wall_of(w, box)
+            if law.wall[w] and bodies.kind[i] == GRAIN:
+                if nx * x[i, 0] + ny * x[i, 1] + bodies.radius[i] > place - skin:
+                    disc.append(np.int32(i))
+                    side.append(np.int32(w))
+    k = len(disc)
+    discs, sides, memory = np.empty(k, np.int32), np.empty(k, np.int32), np.zeros((k, COLUMNS + 1))
+    seen = 0
+    for c in range(k):
+        discs[c], sides[c] = disc[c], side[c]
+        while seen < old.disc.size and (
+            old.disc[seen] < disc[c] or (old.disc[seen] == disc[c] and old.side[seen] < side[c])
+        ):
+            seen += 1
+        if seen < old.disc.size and old.disc[seen] == disc[c] and old.side[seen] == side[c]:
+            memory[c, :COLUMNS], memory[c, COLUMNS] = old.wall_memory[seen], old.wall_normal[seen]
+    return Near(
+        start, neighbour, first, neighbour, carried[:, :COLUMNS].copy(), carried[:, COLUMNS].copy(), np.zeros(m), np.zeros(m),
+        discs, sides, memory[:, :COLUMNS].copy(), memory[:, COLUMNS].copy(), np.zeros(k), np.zeros(k),
+        x[:, :2].copy(), box.copy(),
+    )  # fmt: skip
+
+
+@kernel()
+def is_stale(x, box, near, skin):
+    """Whether a disc or wall may have moved more than half the skin since the list was made."""
+    most = 0.0
+    for i in range(x.shape[0]):
+        dx, dy = x[i, 0] - near.place[i, 0], x[i, 1] - near.place[i, 1]
+        most = max(most, dx * dx + dy * dy)
+    wall = max(abs(box[2] - near.box[2]), abs(box[3] - near.box[3]))
+    return not most < 0.25 * skin * skin or not wall < 0.5 * skin
+
+
+@kernel()
+def forces(x, anchor, near, bodies, law, box, fixing, count, sums):
+    """Fixing forces of all discs at x; the slider returns to its limit from the anchor.
+
+    The normal force is kn times the overlap, a state; the tangential one starts from the memory and takes kt times the relative displacement since
+    the anchor (n, 3), along the tangent in the middle of the way. fixing (n, 3) [N], count (n,): contacts, sums (SUMS,): changed in place,
+    as are the forces in `near`.
+    """
+    n = bodies.radius.size
+    radius, memory = bodies.radius, near.memory
+    kn, kt, mu, cohesion = law.kn, law.kt, law.friction, law.cohesion
+    sums[:] = 0.0
+    sums[GAP_X] = sums[GAP_Y] = np.inf
+    for i in range(n):
+        fixing[i, 0], fixing[i, 1], fixing[i, 2] = -bodies.load[i, 0], -bodies.load[i, 1], 0.0
+        count[i] = 0
+    flips = 0
+    for c in range(near.first.size):
+        i, j = near.first[c], near.second[c]
+        ex, ey, reach = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], radius[i] + radius[j]
+        square = ex * ex + ey * ey
+        if square >= reach * reach:
+            if near.normal[c] > 0.0:
+                flips += 1
+            near.normal[c] = near.shear[c] = near.slip[c] = 0.0
+            continue
+        if near.normal[c] == 0.0:
+            flips += 1
+        distance = math.sqrt(square)
+        p = kn * (reach - distance)
+        nx, ny = ex / distance, ey / distance
+        mx, my = ex + anchor[j, 0] - anchor[i, 0], ey + anchor[j, 1] - anchor[i, 1]
+        ux = (x[i, 0] - anchor[i, 0]) - (x[j, 0] - anchor[j, 0])
+        uy = (x[i, 1] - anchor[i, 1]) - (x[j, 1] - anchor[j, 1])
+        turn = (x[i, 2] - anchor[i, 2]) + (x[j, 2] - anchor[j, 2])
+        trial = memory[c, SHEAR] + kt * ((mx * uy - my * ux) / math.sqrt(mx * mx + my * my) + turn)
+        limit = mu * p + cohesion
+        t = min(max(trial, -limit), limit)
+        near.normal[c], near.shear[c], near.slip[c] = p, t, (trial - t) / kt
+        fx, fy = p * nx - t * ny, p * ny + t * nx
+        fixing[i, 0] += fx
+        fixing[i, 1] += fy
+        fixing[i, 2] += t
+        fixing[j, 0] -= fx
+        fixing[j, 1] -= fy
+        fixing[j, 2] += t
+        count[i] += 1
+        count[j] += 1
+        if j >= bodies.grains:
+            ax, ay = (
+                x[i, 0] + nx * (radius[i] - 0.5 * p / kn) - box[0],
+                x[i, 1] + ny * (radius[i] - 0.5 * p / kn) - box[1],
+            )
+            sums[XX] += fx * ax
+            sums[YY] += fy * ay
+            sums[STIFF_X] += (kn * nx * nx + kt * ny * ny) * ax * ax
+            sums[STIFF_Y] += (kn * ny * ny + kt * nx * nx) * ay * ay
+    for c in range(near.disc.size):
+        i, side = near.disc[c], near.side[c]
+        nx, ny, place = wall_of(side, box)
+        overlap = nx * x[i, 0] + ny * x[i, 1] + radius[i] - place
+        if overlap <= 0.0:
+            if near.wall_normal[c] > 0.0:
+                flips += 1
+            near.wall_normal[c] = near.wall_shear[c] = near.wall_slip[c] = 0.0
+            gap = GAP_X if side <= RIGHT else GAP_Y
+            sums[gap] = min(sums[gap], -overlap)
+            continue
+        if near.wall_normal[c] == 0.0:
+            flips += 1
+        p = kn * overlap
+        along = (x[i, 1] - anchor[i, 1]) * nx - (x[i, 0] - anchor[i, 0]) * ny + (x[i, 2] - anchor[i, 2])
+        trial = near.wall_memory[c, SHEAR] + kt * along
+        limit = law.wall_friction[side] * p
+        t = min(max(trial, -limit), limit)
+        near.wall_normal[c], near.wall_shear[c], near.wall_slip[c] = p, t, (trial - t) / kt
+        fixing[i, 0] += p * nx - t * ny
+        fixing[i, 1] += p * ny + t * nx
+        fixing[i, 2] += t
+        count[i] += 1
+        arm = box[2] if side <= RIGHT else box[3]
+        sums[WALL_X if side <= RIGHT else WALL_Y] += p
+        sums[XX if side <= RIGHT else YY] += p * arm
+        sums[STIFF_X if side <= RIGHT else STIFF_Y] += kn * arm * arm
+    sums[FLIPS] = flips
+
+
+@kernel(inline=True)
+def _add(stiffness, i, nx, ny, kn, kt):
+    """Add T' diag(kn, kt) T of a contact with the outward normal (nx, ny) to the block of disc i: xx, xy, xq, yy, yq, qq."""
+    stiffness[i, 0] += kn * nx * nx + kt * ny * ny
+    stiffness[i, 1] += (kn - kt) * nx * ny
+    stiffness[i, 2] -= kt * ny
+    stiffness[i, 3] += kn * ny * ny + kt * nx * nx
+    stiffness[i, 4] += kt * nx
+    stiffness[i, 5] += kt
+
+
+@kernel()
+def contact_stiffness(x, near, bodies, law, box, stiffness, last):
+    """Contact stiffness S (8) of each disc, shape (n, 6) as xx, xy, xq, yy, yq, qq, with kt also where contacts slide.
+
+    last (n, 2): normal of the last contact of each disc, towards the other body. Both are overwritten.
+    """
+    stiffness[:] = 0.0
+    for c in range(near.first.size):
+        if near.normal[c] > 0.0:
+            i, j = near.first[c], near.second[c]
+            ex, ey = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
+            distance = math.sqrt(ex * ex + ey * ey)
+            nx, ny = ex / distance, ey / distance
+            _add(stiffness, i, nx, ny, law.kn, law.kt)
+            _add(stiffness, j, -nx, -ny, law.kn, law.kt)
+            last[i, 0], last[i, 1], last[j, 0], last[j, 1] = nx, ny, -nx, -ny
+    for c in range(near.disc.size):
+        if near.wall_normal[c] > 0.0:
+            nx, ny, _ = wall_of(near.side[c], box)
+            rough = law.kt if law.wall_friction[near.side[c]] > 0.0 else 0.0
+            _add(stiffness, near.disc[c], nx, ny, law.kn, rough)
+            last[near.disc[c], 0], last[near.disc[c], 1] = nx, ny
+
+
+@kernel()
+def set_anchor(x, anchor, near):
+    """The slider starts from here."""
+    anchor[:] = x
+    near.memory[:, SHEAR], near.memory[:, NORMAL] = near.shear, near.normal
+    near.wall_memory[:, SHEAR], near.wall_memory[:, NORMAL] = near.wall_shear, near.wall_normal
+
+
+@kernel()
+def begin_step(near):
+    """A sub-step starts from here: forces are kept, and nothing has been lost yet."""
+    near.memory[:, STEP_SHEAR], near.memory[:, STEP_NORMAL], near.memory[:, LOST] = near.shear, near.normal, 0.0
+    near.wall_memory[:, STEP_SHEAR], near.wall_memory[:, STEP_NORMAL] = near.wall_shear, near.wall_normal
+    near.wall_memory[:, LOST] = 0.0
+
+
+@kernel()
+def lose(near):
+    """Adds to LOST what sliding since the anchor has cost: mean shear force times slip, where there was force at both ends (28)."""
+    for c in range(near.first.size):
+        if near.slip[c] != 0.0 and near.memory[c, NORMAL] > 0.0:
+            near.memory[c, LOST] += 0.5 * (near.memory[c, SHEAR] + near.shear[c]) * near.slip[c]
+    for c in range(near.disc.size):
+        if near.wall_slip[c] != 0.0 and near.wall_memory[c, NORMAL] > 0.0:
+            near.wall_memory[c, LOST] += 0.5 * (near.wall_memory[c, SHEAR] + near.wall_shear[c]) * near.wall_slip[c]
+
+
+@kernel()
+def lose_in_step(x, began, near, law):
+    """LOST of a whole sub-step by (25)-(28), from its start at `began` (n, 3): for a slider that was moved on in between."""
+    for c in range(near.first.size):
+        i, j = near.first[c], near.second[c]
+        near.memory[c, LOST] = 0.0
+        if near.normal[c] > 0.0 and near.memory[c, STEP_NORMAL] > 0.0:
+            mx = x[j, 0] - x[i, 0] + began[j, 0] - began[i, 0]
+            my = x[j, 1] - x[i, 1] + began[j, 1] - began[i, 1]
+            ux = (x[i, 0] - began[i, 0]) - (x[j, 0] - began[j, 0])
+            uy = (x[i, 1] - began[i, 1]) - (x[j, 1] - began[j, 1])
+            turn = (x[i, 2] - began[i, 2]) + (x[j, 2] - began[j, 2])
+            along = (mx * uy - my * ux) / math.sqrt(mx * mx + my * my) + turn
+            old, new = near.memory[c, STEP_SHEAR], near.shear[c]
+            near.memory[c, LOST] = 0.5 * (old + new) * (along - (new - old) / law.kt)
+    for c in range(near.disc.size):
+        i = near.disc[c]
+        near.wall_memory[c, LOST] = 0.0
+        if near.wall_normal[c] > 0.0 and near.wall_memory[c, STEP_NORMAL] > 0.0:
+            nx, ny = 0.0, 0.0
+            if near.side[c] <= RIGHT:
+                nx = 1.0 if near.side[c] == RIGHT else -1.0
+            else:
+                ny = 1.0 if near.side[c] == TOP else -1.0
+            along = (x[i, 1] - began[i, 1]) * nx - (x[i, 0] - began[i, 0]) * ny + x[i, 2] - began[i, 2]
+            old, new = near.wall_memory[c, STEP_SHEAR], near.wall_shear[c]
+            near.wall_memory[c, LOST] = 0.5 * (old + new) * (along - (new - old) / law.kt)
+
+
+@kernel()
+def stored(near, law):
+    """Energy of the normal and of the tangential springs [J], by (22)."""
+    normal = (near.normal**2).sum() + (near.wall_normal**2).sum()
+    shear = (near.shear**2).sum() + (near.wall_shear**2).sum()
+    return 0.5 * normal / law.kn, 0.5 * shear / law.kt
