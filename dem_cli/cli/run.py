@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from dem_cli.cli import INTERRUPTED, Settings
+from dem_cli.errors import ScenarioError
 
 
 @click.command(name="run", short_help="Run a scenario; write a result file.")
@@ -27,9 +28,11 @@ def command(
     it is complete. Ctrl-C ends the run with exit code 130, and a blow-up with 1; what was written stays readable. Progress goes to stderr.
     """
     from dem_cli.results.writer import check_target, partial_path
-    from dem_cli.scenario import load_scenario
+    from dem_cli.scenario import Scenario, load_scenario
 
     loaded = load_scenario(scenario, overrides)
+    if not isinstance(loaded, Scenario):
+        raise ScenarioError(f'{scenario}: engine = "{loaded.engine}" is not run by this version. Try dem check')
     target = output or Path(scenario.with_suffix(".h5").name)
     check_target(target, force=force)
 
