@@ -27,7 +27,7 @@ def command(
     The result file is SCENARIO's name with .h5 in the present folder; it grows under NAME.partial.h5 and takes its own name when
     it is complete. Ctrl-C ends the run with exit code 130, and a blow-up with 1; what was written stays readable. Progress goes to stderr.
     """
-    from dem_cli.results.writer import check_target, partial_path
+    from dem_cli.results.files import check_target, partial_path
     from dem_cli.scenario import Scenario, load_scenario
 
     loaded = load_scenario(scenario, overrides)
