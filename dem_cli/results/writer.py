@@ -72,6 +72,10 @@ class ResultWriter:
         self.path = Path(path)
         self._open = False
         self._finished = False
+        self._layout = layout_of(engine)
+        if (surface_x is None) == self._layout.surface:
+            raise ValueError("a run over time needs the bins of its free surface, and no other run has them")
+        self._rows = 0  # of the series
         check_target(self.path, force=force)
         self._partial = partial_path(path)
         self._started = self._flushed = clock.monotonic()
@@ -79,8 +83,6 @@ class ResultWriter:
         self._track_ids = None if tracks is None or len(tracks) == 0 else np.asarray(tracks, dtype=np.int64)
         self._file = create_file(self._partial)
         self._open = True
-        self._layout = layout_of(engine)
-        self._rows = 0  # of the series
         attributes = {
             "title": title,
             "scenario": scenario_text,
@@ -137,10 +139,8 @@ class ResultWriter:
         return self._partial if not self._finished else self.path
 
     def _create_surface(self, x: Floats | None) -> Table | None:
-        if not self._layout.surface:
-            return None
         if x is None:
-            raise ValueError("a run over time needs the bins of its free surface")
+            return None
         group = self._file.create_group("surface")
         unit, definition = SURFACE["x"]
         across = make_scale(group, "x", np.asarray(x, dtype=np.float64), unit, definition)
