@@ -59,4 +59,4 @@ def box_corners(walls: Walls, grains: Grains) -> Floats:
             for k in (at[name] for name in sides if name in at):
                 falls = ends[2 * k, axis] > ends[2 * k + 1, axis]
                 ends[2 * k : 2 * k + 2, axis] = (high, low) if falls else (low, high)
-    return np.where(np.isfinite(ends), ends, drawn_walls(walls, grains)) if len(ends) else ends
+    return ends if np.isfinite(ends).all() else np.where(np.isfinite(ends), ends, drawn_walls(walls, grains))
