@@ -69,7 +69,10 @@ ONE_LINE: list[tuple[dict[str, Any], list[str]]] = [
     ({"stage": {"kind": "settle"}}, ["stage = ", "must be a list of tables. Head each stage with [[stage]]"]),
     ({"stage.0": "settle"}, ['[[stage]] 1 = "settle": must be a table']),
     # choices
-    ({"engine": "explict"}, ['engine = "explict": must be explicit. Did you mean "explicit"?']),
+    (
+        {"engine": "explict"},
+        ['engine = "explict": must be one of explicit, granular-element. Did you mean "explicit"?'],
+    ),
     ({"contact.tension": "dampng"}, ['[contact] tension = "dampng": must be one of none, damping.', '"damping"?']),
     ({"stage.0.kind": "setle"}, ['[[stage]] 1 kind = "setle": must be one of settle, shake, run.', '"settle"?']),
     # ranges

@@ -10,10 +10,13 @@ import jsonschema
 import pytest
 from scenario_text import ABSENT, small
 
-from dem_cli.scenario import Scenario, parse_scenario
+from dem_cli.scenario import parse_scenario
+from dem_cli.scenario.engines import ALL_STAGES, ENGINES
 from dem_cli.scenario.reference import json_schema, reference_markdown
-from dem_cli.scenario.stages import STAGES
 from dem_cli.scenario.table import Table, _good_values
+
+# Keys from which defaults of others follow.
+NEEDED = {"friction": 0.1, "hold": "volume", "limit": {"strain": 0.01}}
 
 
 def all_tables(start: type[Table]) -> set[type[Table]]:
@@ -32,11 +35,22 @@ def all_tables(start: type[Table]) -> set[type[Table]]:
     return found
 
 
-TABLES = sorted(all_tables(Scenario), key=lambda table: table.__name__)
+TABLES = sorted(set.union(*(all_tables(scenario) for scenario in ENGINES.values())), key=lambda table: table.__name__)
+SCENARIOS = set(ENGINES.values())
 
 
 def test_all_tables_are_found() -> None:
-    assert {"Scenario", "Radius", "Grading", "ExtraDamping", "Shake", "Window"} <= {t.__name__ for t in TABLES}
+    assert {
+        "Scenario",
+        "Radius",
+        "Grading",
+        "ExtraDamping",
+        "Shake",
+        "Window",
+        "QuasiStaticScenario",
+        "Cyclic",
+        "Limit",
+    } <= {t.__name__ for t in TABLES}
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.__name__)
@@ -44,7 +58,7 @@ def test_every_key_is_described(table: type[Table]) -> None:
     assert table.__doc__
     for name, field in table.model_fields.items():
         assert field.description, name
-        if table is not Scenario:
+        if table not in SCENARIOS:
             assert field.examples, name
 
 
@@ -53,18 +67,18 @@ def test_examples_are_valid(table: type[Table]) -> None:
     """What messages suggest to write must be right."""
     for name, field in table.model_fields.items():
         if field.examples:
-            assert name in _good_values(table, {field.alias or name: field.examples[0], "friction": 0.1}), name
+            assert name in _good_values(table, NEEDED | {field.alias or name: field.examples[0]}), name
 
 
 def test_reference_names_every_key() -> None:
     text = reference_markdown()
     for table in TABLES:
-        if table is Scenario:
+        if table in SCENARIOS:
             continue
         for name, field in table.model_fields.items():
             key = field.alias or name
             assert f"{key}` |" in text or key == "kind", (table.__name__, key)
-    for kind in STAGES:
+    for kind in ALL_STAGES:
         assert f'kind = "{kind}"' in text
     assert '| `density` | density above 0 kg/m^3, e.g. `"2480 kg/m^3"` | required | density of the solid |' in text
     rows = [line for line in text.splitlines() if line.startswith("|")]
@@ -117,6 +131,9 @@ def test_schema_refuses_what_the_model_refuses(changes: dict[str, Any]) -> None:
 
 def test_schema_shows_units_ranges_and_defaults_to_editors() -> None:
     properties = SCHEMA["$defs"]["Container"]["properties"]
-    assert "inner width [length with its unit, above 0 m]" in properties["width"]["description"]
+    assert (
+        "inner width; may be left out with a result file, whose width it then is [length with its unit, above 0 m]"
+        in properties["width"]["description"]
+    )
     assert properties["gravity"]["default"] == "9.80665 m/s^2"
     assert "null" not in json.dumps(SCHEMA)

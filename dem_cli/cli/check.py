@@ -24,10 +24,10 @@ def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved:
     Prints all mistakes, or what follows from the scenario: sizes and masses, stiffness and wave speeds, the time step beside its
     stability limit and the thesis' rule, and the steps, file size and run time to expect.
     """
-    from dem_cli.scenario import load_scenario
+    from dem_cli.scenario import Scenario, load_scenario
 
     loaded = load_scenario(scenario, overrides)
-    if resolved:
+    if resolved or not isinstance(loaded, Scenario):
         click.echo(loaded.resolved_toml(), nl=False)
         return
     from dem_cli.cli.derived import derive

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
@@ -10,20 +11,24 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
+from dem_cli import units
 from dem_cli.errors import ScenarioError
 from dem_cli.scenario import mistakes
+from dem_cli.scenario.base import AnyScenario, tracked_exist
+from dem_cli.scenario.engines import engine_of, unknown_engine
 from dem_cli.scenario.grain_file import SCALE, read_grain_file
-from dem_cli.scenario.model import Scenario, tracked_exist
+from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.overrides import apply_overrides
+from dem_cli.scenario.quasi_static import QuasiStaticScenario, unprepared
 from dem_cli.scenario.raw_record import RecordError
 from dem_cli.scenario.stages import Shake
-from dem_cli.scenario.stored_grains import StoredGrains
+from dem_cli.scenario.stored_grains import StoredGrains, is_result_file, read_stored_grains
 from dem_cli.scenario.table import NOTHING
 
 Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
 
 
-def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
+def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario | QuasiStaticScenario:
     """The scenario of a TOML file, changed by `overrides` ("contact.friction=0.3"). ScenarioError holds a line per mistake."""
     path = Path(path)
     try:
@@ -43,7 +48,7 @@ def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario:
 
 def parse_scenario(
     text: str, origin: str = "<text>", folder: str | Path = ".", overrides: Iterable[str] = ()
-) -> Scenario:
+) -> Scenario | QuasiStaticScenario:
     """The scenario that `text` holds. origin: its name in messages. folder: where paths in it start."""
     try:
         raw = tomllib.loads(text)
@@ -51,10 +56,16 @@ def parse_scenario(
         raise ScenarioError(mistakes.syntax(origin, text, error)) from None
     folder = Path(folder)
     lines = apply_overrides(raw, overrides)
-    scenario: Scenario | None = None
+    kind = engine_of(raw)
+    if kind is None:
+        loc, rule, remedy = unknown_engine(raw)
+        lines.append(mistakes.line(origin, loc, raw["engine"], rule, remedy, raw))
+        raise ScenarioError("\n".join(lines))
+    _width_of_file(raw, folder, kind)
+    scenario: Scenario | QuasiStaticScenario | None = None
     found: list[Found] = []
     try:
-        scenario = Scenario.model_validate(raw)
+        scenario = kind.model_validate(raw)
     except ValidationError as error:
         for one in error.errors(include_url=False):
             ctx = one["ctx"]
@@ -72,7 +83,21 @@ def parse_scenario(
     return scenario
 
 
-def _records(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> list[Found]:
+def _width_of_file(raw: dict[str, Any], folder: Path, kind: type[AnyScenario]) -> None:
+    """Fills in the width of an explicit scenario's container, where it is left out, from the result file that gives the grains."""
+    packing, container = raw.get("packing"), raw.get("container")
+    name = packing.get("file") if isinstance(packing, dict) else None
+    if kind is not Scenario or not isinstance(container, dict) or "width" in container or not isinstance(name, str):
+        return
+    stage = packing.get("stage") if isinstance(packing, dict) else None
+    if not is_result_file(name):
+        return
+    with contextlib.suppress(ScenarioError):  # said with the other mistakes
+        stored = read_stored_grains(folder / name, stage if isinstance(stage, str) else None)
+        container["width"] = units.write(stored.width, "m")
+
+
+def _records(raw: dict[str, Any], folder: Path, scenario: AnyScenario | None) -> list[Found]:
     """Reads the records of shaking into their stages; their mistakes, also where the scenario has others."""
     found: list[Found] = []
     tables = raw.get("stage")
@@ -96,7 +121,7 @@ def _records(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> li
     return found
 
 
-def _stored_shape(stored: StoredGrains, name: str, scenario: Scenario) -> list[Found]:
+def _stored_shape(stored: StoredGrains, name: str, scenario: AnyScenario) -> list[Found]:
     """Grains of a result file are of the scenario's shape; bonded grains and clumps of one template may stand for each other."""
     shape, elements = scenario.grains.shape, scenario.grains.elements
     alike = {"bonded": "clump", "clump": "bonded"}
@@ -109,7 +134,7 @@ def _stored_shape(stored: StoredGrains, name: str, scenario: Scenario) -> list[F
     return []
 
 
-def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) -> list[Found]:
+def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | QuasiStaticScenario | None) -> list[Found]:
     """Mistakes of the file of grains, and of keys that disagree with it."""
     packing = raw.get("packing")
     name = packing.get("file") if isinstance(packing, dict) else None
@@ -134,6 +159,9 @@ def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) 
     shape, ratio = scenario.grains.shape, scenario.grains.aspect_ratio
     if grains.stored:
         found += _stored_shape(grains.stored, name, scenario)
+        if isinstance(scenario, QuasiStaticScenario) and grains.stored.engine != scenario.engine:
+            table = raw["stage"]
+            found += [(m.loc, table[m.loc[1]].get("hold"), m.rule, m.remedy) for m in unprepared(scenario.stages)]
     if grains.aspect is not None and shape != "ellipse":
         rule = f'has a column aspect, which is none of shape = "{shape}"'
         found.append((("packing", "file"), name, rule, 'Leave the column out, or write shape = "ellipse"'))
@@ -145,5 +173,5 @@ def _packing_file(raw: dict[str, Any], folder: Path, scenario: Scenario | None) 
         found.append((("grains", "aspect_ratio"), NOTHING, "is missing", remedy))
     if scenario.output.tracks:
         ids, count = list(scenario.output.tracks.grains), len(grains.x) * scenario.grains.elements
-        found += [(m.loc, ids, m.rule, m.remedy) for m in tracked_exist(scenario.output, count)]
+        found += [(m.loc, ids, m.rule, m.remedy) for m in tracked_exist(scenario.output.tracks, count)]
     return found

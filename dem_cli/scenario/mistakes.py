@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from dem_cli.scenario.stages import STAGES
+from dem_cli.scenario.engines import ALL_STAGES
 from dem_cli.scenario.table import NOTHING, toml_text
 
 LONGEST = 60  # characters of a value that a line shows
@@ -28,16 +28,16 @@ def place(loc: Sequence[str | int], raw: Mapping[str, Any]) -> str:
         stages = raw.get("stage")
         stage = stages[number] if isinstance(stages, list) and number < len(stages) else None
         kind = stage.get("kind") if isinstance(stage, dict) else None
-        if len(parts) > 2 and parts[2] in STAGES:  # the model names the kind that it took the stage for
+        if len(parts) > 2 and parts[2] in ALL_STAGES:  # the model names the kind that it took the stage for
             del parts[2]
-        return f"[[stage]] {number + 1}{f' ({kind})' if kind in STAGES else ''} {_path(parts[2:])}".rstrip()
+        return f"[[stage]] {number + 1}{f' ({kind})' if kind in ALL_STAGES else ''} {_path(parts[2:])}".rstrip()
     if len(parts) == 1:
         table = parts[0] in TABLES
         return f"[{parts[0]}]" if table else str(parts[0])
     return f"[{parts[0]}] {_path(parts[1:])}"
 
 
-TABLES = ("grains", "material", "contact", "container", "packing", "integration", "output")
+TABLES = ("grains", "material", "contact", "container", "packing", "integration", "boundary", "solver", "output")
 
 
 def _path(parts: Sequence[str | int]) -> str:

@@ -8,8 +8,8 @@ import typing
 from collections.abc import Iterable
 from typing import Any
 
+from dem_cli.scenario.engines import ALL_STAGES, engine_of
 from dem_cli.scenario.model import Scenario
-from dem_cli.scenario.stages import STAGES
 from dem_cli.scenario.table import Table, keys_of, nearest
 
 
@@ -47,9 +47,9 @@ def _apply(raw: dict[str, Any], override: str) -> None:
     if parts[0] == "stage" and len(parts) > 1:
         for stage in _stages(raw, parts):
             rest = parts[2:] if _is_selector(raw, parts[1]) else parts[1:]
-            _set(STAGES[stage["kind"]], stage, rest, value, parts[: len(parts) - len(rest)])
+            _set(ALL_STAGES[stage["kind"]], stage, rest, value, parts[: len(parts) - len(rest)])
     else:
-        _set(Scenario, raw, parts, value, [])
+        _set(engine_of(raw) or Scenario, raw, parts, value, [])
 
 
 def _value(text: str) -> Any:
@@ -107,7 +107,7 @@ def _table_of(table: type[Table], name: str) -> type[Table] | None:
 def _usable_stages(raw: dict[str, Any]) -> list[tuple[int, dict[str, Any]]]:
     stages = raw.get("stage")
     listed = stages if isinstance(stages, list) else []
-    return [(k, s) for k, s in enumerate(listed, 1) if isinstance(s, dict) and s.get("kind") in STAGES]
+    return [(k, s) for k, s in enumerate(listed, 1) if isinstance(s, dict) and s.get("kind") in ALL_STAGES]
 
 
 def _is_selector(raw: dict[str, Any], word: str) -> bool:
@@ -125,9 +125,9 @@ def _stages(raw: dict[str, Any], parts: list[str]) -> list[dict[str, Any]]:
         if len(parts) < 3:
             raise _RefusedError("names a stage, but no key of it", f"Write for example --set stage.{which}.name=first")
         return chosen
-    knowing = [(k, s) for k, s in stages if which in keys_of(STAGES[s["kind"]])]
+    knowing = [(k, s) for k, s in stages if which in keys_of(ALL_STAGES[s["kind"]])]
     if not knowing:
-        known = sorted({k for _, s in stages for k in keys_of(STAGES[s["kind"]])})
+        known = sorted({k for _, s in stages for k in keys_of(ALL_STAGES[s["kind"]])})
         near = nearest(which, known)
         advice = f'Did you mean "stage.{".".join([near, *parts[2:]])}"?' if near else f"Known here: {', '.join(known)}"
         raise _RefusedError("unknown key", advice)

@@ -9,18 +9,18 @@ from dem_cli.scenario.quantities import Distance, Length, Number, Whole
 from dem_cli.scenario.stored_grains import is_result_file
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
-Method = Literal["falling", "rejection", "local-move", "growth", "insertion", "file"]
+Method = Literal["falling", "rejection", "local-move", "growth", "insertion", "overlapping", "file"]
 # Keys that only some methods have.
 METHODS_OF = {
     "grid": ("falling", "local-move"),
     "file": ("falling", "file"),
-    "void_ratio": ("falling", "rejection", "local-move", "growth", "insertion"),
-    "height": ("falling", "rejection", "local-move", "growth", "insertion"),
+    "void_ratio": ("falling", "rejection", "local-move", "growth", "insertion", "overlapping"),
+    "height": ("falling", "rejection", "local-move", "growth", "insertion", "overlapping"),
     "attempts": ("falling", "rejection", "insertion"),
     "sweeps": ("local-move",),
 }
 # Void ratios that are aimed at where none is asked for; 0 is as dense as it gets.
-USUAL = {"falling": 2.0, "rejection": 1.2, "local-move": 0.0, "growth": 0.0, "insertion": 0.25}
+USUAL = {"falling": 2.0, "rejection": 1.2, "local-move": 0.0, "growth": 0.0, "insertion": 0.25, "overlapping": 0.28}
 RIVALS = {"grid": "file", "file": "grid", "void_ratio": "height", "height": "void_ratio"}
 
 
@@ -44,7 +44,7 @@ class Grid(Table):
 
 
 class Packing(Table):
-    """Where the grains are at the start. The stages that follow bring them to rest under gravity.
+    """Where the grains are at the start. The stages that follow bring them to rest under gravity, or compress them.
 
     All methods but falling from a grid and file fill the container up to a height that follows from `void_ratio`, or is given as `height`; where
     the grains cannot be packed so densely it becomes higher, and a warning says what was reached.
@@ -54,6 +54,7 @@ class Packing(Table):
         doc="falling: they start apart, from a grid, a file or random places, and fall; rejection: at random places, large ones first, "
         "those that overlap others are tried again; local-move: from a lattice, by small random moves and turns that sink; growth: they "
         "grow from random centres until they touch; insertion: large ones at random places, the others pushed into the widest gaps; "
+        "overlapping (granular element method): at random places, over each other, and then pushed apart without friction; "
         "file: they lie as the file says",
         example="growth",
     )
@@ -65,7 +66,7 @@ class Packing(Table):
     )
     file: str | None = key(
         None,
-        "result file of dem run (.h5): its grains as they lie, without their contacts' memory; or CSV file, a grain a "
+        "result file of dem run (.h5), of any engine: its grains as they lie, without their contacts' memory; or CSV file, a grain a "
         "line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), angle (degrees), spin (rad/s) and, for ellipses, "
         "aspect (a/b) may follow",
         example="grains.csv",
@@ -78,8 +79,8 @@ class Packing(Table):
     )
     void_ratio: Annotated[float, Number(gt=0.0, le=1000.0)] | None = key(
         None,
-        "void ratio of the filled height before the first stage (default: rejection 1.2, insertion 0.25, falling from random places 2; "
-        "growth and local-move as dense as they get)",
+        "void ratio of the filled height before the first stage (default: rejection 1.2, insertion 0.25, overlapping 0.28, falling from "
+        "random places 2; growth and local-move as dense as they get)",
         example=0.25,
     )
     height: Length | None = key(None, "height that is filled, in place of void_ratio", example="30 cm")

@@ -150,6 +150,35 @@ def _plainly(value: Any, example: str) -> str:
     return f"Write {int(number) if number.is_integer() else f'{number:g}'}{quotes}"
 
 
+@dataclass(frozen=True)
+class FrictionNumber(Number):
+    """Annotation of a coefficient of friction: a number, or a friction angle in quotes, which stands for its tangent."""
+
+    ge: float | None = 0.0
+
+    def validate(self, value: Any) -> float:
+        if not isinstance(value, str):
+            return super().validate(value)
+        try:
+            angle = units.parse(value, "rad", "25 deg")
+        except units.UnitError as error:
+            if error.rule.startswith("has no unit"):
+                raise mistake("must be a plain number", _plainly(value, "0.5")) from None
+            raise mistake(error.rule, 'Write a plain number, or a friction angle such as "25 deg"') from None
+        if not 0.0 <= angle < 0.5 * math.pi:
+            raise mistake("is out of range, allowed is from 0 deg, below 90 deg", "Choose an angle in this range")
+        return math.tan(angle)
+
+    def __get_pydantic_json_schema__(self, _: core_schema.CoreSchema, __: GetJsonSchemaHandler) -> JsonSchema:
+        return friction_schema()
+
+
+def friction_schema() -> JsonSchema:
+    """JSON Schema of a coefficient of friction."""
+    angle = {"type": "string", "pattern": r"^\s*\+?[0-9.][0-9._eE+-]*\s*[A-Za-z°µ%].*$", "examples": ["25 deg"]}
+    return {"anyOf": [{"type": "number", "minimum": 0}, angle]}
+
+
 Length = Annotated[float, Quantity(gt=0.0, unit="m", example="7 mm")]
 Distance = Annotated[float, Quantity(ge=0.0, unit="m", example="1.5 cm")]
 Duration = Annotated[float, Quantity(gt=0.0, unit="s", example="0.5 s")]
@@ -161,5 +190,9 @@ Rate = Annotated[float, Quantity(ge=0.0, unit="1/s", example="5 1/s")]
 Angle = Annotated[float, Quantity(unit="rad", example="-90 deg")]
 Density = Annotated[float, Quantity(gt=0.0, unit="kg/m^3", example="2480 kg/m^3")]
 Stiffness = Annotated[float, Quantity(gt=0.0, unit="N/m", example="1e8 N/m")]
+Pressure = Annotated[float, Quantity(gt=0.0, unit="Pa", example="15 kPa")]
+Force = Annotated[float, Quantity(gt=0.0, unit="N", example="1e-5 N")]
+ForceOrZero = Annotated[float, Quantity(ge=0.0, unit="N", example="0.1 N")]
+Friction = Annotated[float, FrictionNumber()]
 Viscosity = Annotated[float, Quantity(gt=0.0, unit="N s/m", example="1e8 N s/m")]
 RotationalViscosity = Annotated[float, Quantity(gt=0.0, unit="N m s", example="1e4 N m s")]

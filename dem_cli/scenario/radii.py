@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from dem_cli.scenario.quantities import JsonSchema, Length, Number
+from dem_cli.scenario.quantities import JsonSchema, Length, Number, Whole
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
 Floats = npt.NDArray[np.float64]
@@ -95,6 +95,13 @@ class Grading(Table):
         return 0.5 / np.sqrt(coarse + (fine - coarse) * rng.random(count))
 
 
+class SizeClass(Table):
+    """Grains of one size."""
+
+    radius: Length = key(doc="their radius", example="3 mm")
+    count: Annotated[int, Whole(ge=1)] = key(doc="how many there are", example=72)
+
+
 class Radius(Table):
     """Radii of the grains: a length if all are equal, or a table with exactly one of the keys below."""
 
@@ -116,7 +123,13 @@ class Radius(Table):
         example={"sieve": ["2 mm", "5 mm", "10 mm"], "passing": [0, 30, 100]},
     )
 
-    alternatives: ClassVar = ((("fixed",), ("uniform",), ("normal",), ("list",), ("grading",)),)
+    classes: tuple[SizeClass, ...] | None = key(
+        None,
+        doc="so many grains of each size, in random order",
+        example=[{"radius": "3 mm", "count": 72}, {"radius": "4.5 mm", "count": 32}],
+    )
+
+    alternatives: ClassVar = ((("fixed",), ("uniform",), ("normal",), ("list",), ("grading",), ("classes",)),)
     short_form: ClassVar[JsonSchema | None] = {
         "type": "string",
         "description": "one radius for all",
@@ -134,6 +147,15 @@ class Radius(Table):
             yield Mistake(("uniform",), "must be ascending", "Write the smaller radius first")
         if good.get("sizes") == ():
             yield Mistake(("list",), "is empty", "Give one radius for each grain")
+        if good.get("classes") == ():
+            yield Mistake(("classes",), "is empty", 'Give for example [{ radius = "3 mm", count = 72 }]')
+
+    @property
+    def number(self) -> int | None:
+        """How many grains there are, where the sizes say so."""
+        if self.sizes is not None:
+            return len(self.sizes)
+        return sum(one.count for one in self.classes) if self.classes is not None else None
 
     @property
     def bounds(self) -> tuple[float, float]:
@@ -146,17 +168,22 @@ class Radius(Table):
             return self.normal.min, self.normal.max
         if self.sizes is not None:
             return min(self.sizes), max(self.sizes)
+        if self.classes is not None:
+            radii = [one.radius for one in self.classes]
+            return min(radii), max(radii)
         assert self.grading is not None
         return self.grading.sieve[0] / 2.0, self.grading.sieve[-1] / 2.0
 
     def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Radii [m], shape (count,). For a list `count` must be its length, and nothing is drawn."""
+        """Radii [m], shape (count,). For a list `count` must be its length, and nothing is drawn; classes are shuffled."""
         if self.fixed is not None:
             return np.full(count, self.fixed)
         if self.uniform is not None:
             return rng.uniform(self.uniform[0], self.uniform[1], count)
         if self.sizes is not None:
             return np.array(self.sizes)
+        if self.classes is not None:
+            return rng.permutation(np.repeat([one.radius for one in self.classes], [one.count for one in self.classes]))
         spread = self.normal or self.grading
         assert spread is not None
         return spread.draw(rng, count)

@@ -10,23 +10,29 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from dem_cli import units
+from dem_cli.scenario.base import AnyScenario
+from dem_cli.scenario.engines import ENGINES
 from dem_cli.scenario.model import Scenario
-from dem_cli.scenario.quantities import Number, Quantity, Range, Whole
-from dem_cli.scenario.stages import STAGES
+from dem_cli.scenario.quantities import FrictionNumber, Number, Quantity, Range, Whole
 from dem_cli.scenario.table import Table, toml_text
 
 HEAD = "| key | value | default | meaning |\n|---|---|---|---|\n"
 
 
 def json_schema() -> dict[str, Any]:
-    """JSON Schema (draft 2020-12) of scenario files."""
-    schema = Scenario.model_json_schema(by_alias=True, mode="validation")
-    head = {
+    """JSON Schema (draft 2020-12) of scenario files: one of the engines' schemas, as `engine` says."""
+    tables: dict[str, Any] = {}
+    for scenario in ENGINES.values():
+        schema = _tidy(scenario.model_json_schema(by_alias=True, mode="validation"))
+        for name, table in (*schema.pop("$defs").items(), (scenario.__name__, schema)):
+            assert tables.setdefault(name, table) == table, f"two tables are called {name}"
+    return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "dem-cli scenario",
         "description": "A scenario of dem-cli. Values with a dimension are strings with their unit.",
+        "oneOf": [{"$ref": f"#/$defs/{scenario.__name__}"} for scenario in ENGINES.values()],
+        "$defs": tables,
     }
-    return head | {k: v for k, v in _tidy(schema).items() if k not in head}
 
 
 def _tidy(node: Any) -> Any:
@@ -51,21 +57,36 @@ def _tidy(node: Any) -> Any:
 
 
 def reference_markdown() -> str:
-    """The reference of scenario files: a Markdown table of keys for each table of the TOML."""
-    sections = [_section("Top level", Scenario, "")]
-    for name, field in Scenario.model_fields.items():
-        if name == "stages":
-            for kind, stage in STAGES.items():
-                sections.append(_section(f'`[[stage]]` with `kind = "{kind}"`', stage, f"stage.{kind}"))
-        elif (table := _table(field)) is not None:
-            sections.append(_section(f"`[{name}]`", table, name))
+    """The reference of scenario files: a Markdown table of keys for each table of the TOML, those that engines share once."""
+    shared = set.intersection(*(set(_tables(scenario)) for scenario in ENGINES.values()))
+    sections = [_section("Top level", Scenario, top=True)]
+    sections += [_section(f"`[{name}]`", table) for name, table in _tables(Scenario) if (name, table) in shared]
+    for engine, scenario in ENGINES.items():
+        sections.append(f'### Only with `engine = "{engine}"`\n')
+        own = [(name, table) for name, table in _tables(scenario) if (name, table) not in shared]
+        before = [(name, table) for name, table in own if name in ("contact", "container")]
+        sections += [_section(f"`[{name}]`", table, level=4) for name, table in before]
+        for kind, stage in scenario.stage_kinds.items():
+            sections.append(_section(f'`[[stage]]` with `kind = "{kind}"`', stage, level=4))
+        sections += [_section(f"`[{name}]`", table, level=4) for name, table in own if (name, table) not in before]
     return "\n".join(sections)
 
 
-def _section(title: str, table: type[Table], path: str) -> str:
-    about = "" if table is Scenario else f"{' '.join((table.__doc__ or '').split())}\n\n"
-    rows = "".join(f"| `{k}` | {v} | {d} | {m} |\n" for k, v, d, m in _rows(table, "", path == ""))
-    return f"### {title}\n\n{about}{HEAD}{rows}"
+def _tables(scenario: type[AnyScenario]) -> list[tuple[str, type[Table]]]:
+    """The tables of a scenario but its stages, by name."""
+    fields = ((name, _table(field)) for name, field in scenario.model_fields.items() if name != "stages")
+    return [(name, table) for name, table in fields if table is not None]
+
+
+def _section(title: str, table: type[Table], *, top: bool = False, level: int = 3) -> str:
+    about = "" if top else f"{' '.join((table.__doc__ or '').split())}\n\n"
+    rows = "".join(f"| `{k}` | {_words_of_engine(k, v, top)} | {d} | {m} |\n" for k, v, d, m in _rows(table, "", top))
+    return f"{'#' * level} {title}\n\n{about}{HEAD}{rows}"
+
+
+def _words_of_engine(key: str, value: str, top: bool) -> str:
+    """What may stand at a key; at `engine` what any scenario has there."""
+    return " or ".join(f'`"{name}"`' for name in ENGINES) if top and key == "engine" else value
 
 
 def _rows(table: type[Table], before: str, top: bool = False) -> Iterator[tuple[str, str, str, str]]:
@@ -75,8 +96,8 @@ def _rows(table: type[Table], before: str, top: bool = False) -> Iterator[tuple[
         inner = _table(field)
         if top and (inner is not None or name == "stages"):
             continue
-        if key == "kind":
-            continue
+        if key == "kind" and field.is_required():
+            continue  # of a stage: the section's title says it
         yield key, _value(field, inner), _default(field), _cell(field.description or "")
         if inner is not None:
             yield from _rows(inner, f"{key}.")
@@ -109,6 +130,8 @@ def _value(field: FieldInfo, inner: type[Table] | None) -> str:
     elif isinstance(bounds, Quantity):
         said = " ".join([units.dimension(bounds.unit), bounds.words(bounds.unit)]).strip()
         said = " or ".join([*(f'`"{w}"`' for w in bounds.words_allowed), said])
+    elif isinstance(bounds, FrictionNumber):
+        said = "number from 0, or angle"
     elif isinstance(bounds, Number):
         said = " ".join(["whole number" if isinstance(bounds, Whole) else "number", bounds.words()]).strip()
     elif words:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import dem_cli
 from dem_cli.errors import ScenarioError
-from dem_cli.scenario.model import files_named
+from dem_cli.scenario.base import files_named
 
 
 @dataclass(frozen=True)

@@ -14,16 +14,22 @@ from dem_cli.errors import ScenarioError
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 SUFFIXES = (".h5", ".hdf5")
+RESULT_FILE = r"\.([hH]5|[hH][dD][fF]5)$"  # the same as a pattern of JSON Schema
 
 
 @dataclass(frozen=True)
 class StoredGrains:
     """Elements of one frame of a result file, shape (n,) each, without what had left the container.
 
-    x, y, a, b [m], angle [rad], vx, vy [m/s], spin [rad/s], body as in state.Grains; shape: key of the run that made them.
+    x, y, a, b [m], angle [rad], vx, vy [m/s], spin [rad/s], body as in state.Grains; x and y count from the left wall and the floor.
+    Chains of boundary grains are left out. engine and shape: of the run that made them. width, height [m]: of what holds the grains;
+    where its top is open, up to the highest of them.
     """
 
+    engine: str
     shape: str
+    width: float
+    height: float
     x: Floats
     y: Floats
     angle: Floats
@@ -62,18 +68,21 @@ def read_stored_grains(path: Path, stage: str | None = None) -> StoredGrains:
             n = int(file.attrs["elements" if "elements" in file.attrs else "grains"])
             start = int(root["Steps/PointOffsets"][_frame_of(path, file, stage, frames)])
             rows = slice(start, start + n)
-            shape = tomllib.loads(str(file.attrs["resolved"]))["grains"]["shape"]
+            resolved = tomllib.loads(str(file.attrs["resolved"]))
             radius = data["radius"][:n]
             a, b = (data[name][:n] if name in data else radius for name in ("a", "b"))
             body = data["body"][:n].astype(np.int64) if "body" in data else np.arange(n, dtype=np.int64)
-            inside = data["escaped"][rows] == 0
+            inside = data["escaped"][rows] == 0 if "escaped" in data else np.ones(n, dtype=bool)
+            inside[n - int(file.attrs.get("boundary", 0)) :] = False
+            walls = _moved_walls(file, root["Points"], start + n)
+            width = float(file.attrs["width"])
             moving = {
                 "x": root["Points"][rows, 0],
                 "y": root["Points"][rows, 1],
                 "angle": data["angle"][rows],
-                "vx": data["velocity"][rows, 0],
-                "vy": data["velocity"][rows, 1],
-                "spin": data["spin"][rows],
+                "vx": data["velocity"][rows, 0] if "velocity" in data else np.zeros(n),
+                "vy": data["velocity"][rows, 1] if "velocity" in data else np.zeros(n),
+                "spin": data["spin"][rows] if "spin" in data else np.zeros(n),
             }
     except (KeyError, OSError, ValueError) as error:
         raise ScenarioError(f"{path}: is not a result file of dem run ({error}). Give one, or a CSV file") from None
@@ -81,7 +90,32 @@ def read_stored_grains(path: Path, stage: str | None = None) -> StoredGrains:
         raise ScenarioError(f"{path}: all its grains have left the container. Take another file")
     columns = {name: values[inside] for name, values in (moving | {"a": a, "b": b}).items()}
     kept = body[inside]
-    return StoredGrains(shape=shape, body=np.cumsum(np.diff(kept, prepend=kept[0]) != 0), **columns)
+    if str(file_engine := resolved.get("engine", "explicit")) == "explicit":
+        sides = {"left": 0.0, "bottom": 0.0, "right": width, "top": float(np.max(columns["y"] + columns["a"]))}
+    else:
+        sides = _box(walls, columns["x"], columns["y"], columns["a"])
+    columns["x"], columns["y"] = columns["x"] - sides["left"], columns["y"] - sides["bottom"]
+    return StoredGrains(
+        engine=str(file_engine),
+        shape=resolved["grains"]["shape"],
+        width=sides["right"] - sides["left"],
+        height=sides["top"] - sides["bottom"],
+        body=np.cumsum(np.diff(kept, prepend=kept[0]) != 0),
+        **columns,
+    )
+
+
+def _moved_walls(file: Any, points: Any, start: int) -> dict[str, float]:
+    """Where the walls of a frame are [m], by name: x of left and right, y of bottom and top; its points begin at `start`, two a wall."""
+    names = [str(name) for name in file["walls/name"].asstr()[:]]
+    ends = points[start : start + 2 * len(names)].reshape(-1, 2, points.shape[1])
+    return {name: float(ends[k, :, 0 if name in ("left", "right") else 1].mean()) for k, name in enumerate(names)}
+
+
+def _box(walls: dict[str, float], x: Floats, y: Floats, r: Floats) -> dict[str, float]:
+    """The walls, and where there is none the outermost grain."""
+    edges = {"left": np.min(x - r), "right": np.max(x + r), "bottom": np.min(y - r), "top": np.max(y + r)}
+    return {name: walls.get(name, float(edge)) for name, edge in edges.items()}
 
 
 def _frame_of(path: Path, file: Any, stage: str | None, frames: int) -> int:

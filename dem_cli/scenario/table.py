@@ -75,6 +75,8 @@ class Table(BaseModel):
     more_schema: ClassVar[JsonSchema] = {}
     # JSON Schema of the short form that `spell_out` understands.
     short_form: ClassVar[JsonSchema | None] = None
+    # Keys ("height") and words ("kind=shake") that belong to another engine: its name, and what to do here.
+    elsewhere: ClassVar[Mapping[str, tuple[str, str]]] = {}
     # What the manual calls it, where its type does not say.
     short_words: ClassVar[str | None] = None
 
@@ -94,6 +96,17 @@ class Table(BaseModel):
         """Keys, from this table's own level, that an override of the key at `path` by `value` leaves without meaning."""
         del path, value
         return []
+
+    @classmethod
+    def kinds(cls) -> list[str]:
+        """Kinds of stages, where a table holds such."""
+        return []
+
+    @classmethod
+    def other_engine(cls, name: str) -> tuple[str, str] | None:
+        """Rule and remedy for a key or word of another engine."""
+        engine, remedy = cls.elsewhere.get(name, ("", ""))
+        return (f'belongs to engine = "{engine}"', remedy) if engine else None
 
     @model_validator(mode="wrap")
     @classmethod
@@ -226,11 +239,13 @@ def _in_our_words(cls: type[Table], error: Any) -> InitErrorDetails | None:
     elif kind in _PLAIN:
         rule, remedy = _PLAIN[kind]
     elif kind == "extra_forbidden":
-        rule, remedy = "unknown key", did_you_mean(str(loc[-1]), keys_of(cls))
+        rule, remedy = cls.other_engine(str(loc[-1])) or ("unknown key", did_you_mean(str(loc[-1]), keys_of(cls)))
     elif kind == "missing" and isinstance(loc[-1], int):
         rule, remedy, value = "is missing", "Give both values", NOTHING
     elif kind == "missing":
         rule, remedy, value = "is missing", _example_of(cls, str(loc[-1])), NOTHING
+    elif kind == "literal_error" and (other := cls.other_engine(f"{loc[-1]}={value}")):
+        rule, remedy = other
     elif kind == "literal_error":
         words = [w.strip("' ") for w in str(ctx["expected"]).replace(" or ", ",").split(",")]
         rule, remedy = (
@@ -242,12 +257,13 @@ def _in_our_words(cls: type[Table], error: Any) -> InitErrorDetails | None:
     elif kind == "too_short":
         rule, remedy = "has too few values", f"Give at least {ctx['min_length']}"
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
-        kinds = [w.strip("' ") for w in str(ctx.get("expected_tags", "'settle', 'shake', 'run'")).split(",")]
+        kinds = [w.strip("' ") for w in str(ctx["expected_tags"]).split(",")] if "expected_tags" in ctx else cls.kinds()
         said = value.get("kind") if isinstance(value, dict) else value
         rule = f"must be one of {', '.join(kinds)}" if kind == "union_tag_invalid" else "is missing"
         remedy = (
             did_you_mean(str(said), kinds) if kind == "union_tag_invalid" else f"Write kind = one of {', '.join(kinds)}"
         )
+        rule, remedy = cls.other_engine(f"kind={said}") or (rule, remedy)
         loc, value = (*loc, "kind"), NOTHING if said is None else said
     return InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=value)
 

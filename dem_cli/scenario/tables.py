@@ -8,12 +8,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Strict
+from pydantic_core import PydanticCustomError
 
 from dem_cli.scenario.quantities import (
     Acceleration,
     Angle,
     Density,
     Duration,
+    Friction,
+    FrictionNumber,
     JsonSchema,
     Length,
     Number,
@@ -21,13 +24,13 @@ from dem_cli.scenario.quantities import (
     Stiffness,
     Velocity,
     Whole,
+    friction_schema,
 )
 from dem_cli.scenario.radii import Radius
 from dem_cli.scenario.restitution import Tension, damping_ratio
 from dem_cli.scenario.shapes import AspectRatio, Bond, Orientation, Template
 from dem_cli.scenario.table import Given, Mistake, Table, key
 
-Friction = Annotated[float, Number(ge=0.0)]
 Ratio = Annotated[float, Number(ge=0.0)]
 Share = Annotated[float, Number(ge=0.0, lt=1.0)]
 SIDES = ("left", "right", "bottom", "top")
@@ -51,7 +54,7 @@ class Grains(Table):
         example="disc",
     )
     count: Annotated[int, Whole(ge=1)] | None = key(
-        None, "number of grains; may be left out with a list of radii or a file", example=3000
+        None, "number of grains; may be left out with a list or classes of radii, or a file", example=3000
     )
     density: Density = key(doc="density of the solid", example="2480 kg/m^3")
     radius: Radius | None = key(
@@ -88,11 +91,10 @@ class Grains(Table):
     def rules(cls, given: Given) -> Iterator[Mistake]:
         raw, good = given
         count, radius = good.get("count"), good.get("radius")
-        if radius and radius.sizes and count is not None and count != len(radius.sizes):
+        if radius and radius.number and count is not None and count != radius.number:
+            whose = "radii of the list" if radius.sizes else "grains of the classes"
             yield Mistake(
-                ("count",),
-                f"differs from the {len(radius.sizes)} radii of the list",
-                "Leave count out, or make them agree",
+                ("count",), f"differs from the {radius.number} {whose}", "Leave count out, or make them agree"
             )
         for name in SHAPES_OF if "shape" in good else ():
             if name in raw and good["shape"] not in SHAPES_OF[name]:
@@ -104,6 +106,11 @@ class Grains(Table):
     @classmethod
     def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
         return [(name,) for name in SHAPES_OF if tuple(path) == ("shape",) and value not in SHAPES_OF[name]]
+
+    @property
+    def number(self) -> int:
+        """Number of grains, 0 where only a file says it."""
+        return self.count or (self.radius.number if self.radius else None) or 0
 
     @property
     def elements(self) -> int:
@@ -163,7 +170,8 @@ class WallFriction(Table):
     bottom: Friction = key(maker=_no_friction, doc="friction of the floor (default: as between grains)", example=0.25)
     top: Friction = key(maker=_no_friction, doc="friction of the lid (default: as between grains)", example=0.25)
 
-    short_form: ClassVar[JsonSchema | None] = {"type": "number", "minimum": 0, "description": "the same for all walls"}
+    short_form: ClassVar[JsonSchema | None] = friction_schema() | {"description": "the same for all walls"}
+    short_words: ClassVar[str | None] = "number or angle"
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
@@ -190,7 +198,7 @@ class DampingRatio(Table):
 class Contact(Table):
     """The law between grains, and between grains and walls: linear spring, dashpot and slider."""
 
-    friction: Friction = key(doc="coefficient of friction between grains, tan of the friction angle", example=0.17)
+    friction: Friction = key(doc="coefficient of friction between grains, or the friction angle", example=0.17)
     wall_friction: WallFriction = key(
         maker=lambda good: good["friction"], doc="friction of the walls (default: as between grains)", example=0.25
     )
@@ -217,6 +225,7 @@ class Contact(Table):
     )
 
     alternatives: ClassVar = ((("damping_ratio",), ("restitution",)),)
+    elsewhere: ClassVar = {"cohesion": ("granular-element", 'Leave it out, or write engine = "granular-element"')}
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
@@ -224,9 +233,11 @@ class Contact(Table):
         walls = raw.get("wall_friction") if isinstance(raw, dict) else None
         if not isinstance(walls, dict):
             return raw
-        inner = raw.get("friction")
-        usable = isinstance(inner, (int, float)) and not isinstance(inner, bool) and inner >= 0.0
-        return raw | {"wall_friction": dict.fromkeys(SIDES, inner if usable else 0.0) | walls}
+        try:
+            inner = FrictionNumber().validate(raw.get("friction"))
+        except PydanticCustomError:
+            inner = 0.0
+        return raw | {"wall_friction": dict.fromkeys(SIDES, inner) | walls}
 
     def damping(self) -> tuple[float, float]:
         """Damping ratios hn, hs [-]; a restitution is inverted by the formula that fits `tension`, for both directions."""
@@ -240,7 +251,9 @@ class Contact(Table):
 class Container(Table):
     """The container: a floor at y = 0, walls at x = 0 and x = width, and gravity."""
 
-    width: Length = key(doc="inner width", example="121.5 cm")
+    width: Length = key(
+        doc="inner width; may be left out with a result file, whose width it then is", example="121.5 cm"
+    )
     height: Length | None = key(
         None,
         "height of the walls; left out, they have no upper end. What goes over them is lost and counted",
@@ -249,6 +262,8 @@ class Container(Table):
     lid: Annotated[bool, Strict()] = key(False, "a wall on top, at height", example=False)
     gravity: Acceleration = key("9.80665 m/s^2", "gravity", example="980 gal")
     gravity_direction: Angle = key("-90 deg", "direction of gravity, anticlockwise from +x", example="-90 deg")
+
+    more_schema: ClassVar[JsonSchema] = {"required": []}  # the scenario says when width is needed
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
@@ -276,14 +291,13 @@ class Integration(Table):
     )
 
 
-class Tracks(Table):
+class Followed(Table):
     """Grains that are followed closely."""
 
     grains: tuple[Annotated[int, Whole(ge=0)], ...] = key(
         doc="their ids, counted from 0; each disc of a bonded grain or clump has its own, grain after grain",
         example=[484, 499, 514],
     )
-    interval: Duration = key("1 ms", "time between records", example="1 ms")
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
@@ -293,6 +307,12 @@ class Tracks(Table):
             yield Mistake(("grains",), "is empty", "Name at least one grain, or leave tracks out")
         if twice := sorted(k for k, n in Counter(ids or ()).items() if n > 1):
             yield Mistake(("grains",), f"names grain {twice[0]} twice", "Name each grain once")
+
+
+class Tracks(Followed):
+    """Grains that are followed closely."""
+
+    interval: Duration = key("1 ms", "time between records", example="1 ms")
 
 
 class Window(Table):
