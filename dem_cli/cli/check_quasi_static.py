@@ -9,7 +9,6 @@ from dem_cli.scenario import Compress, Cyclic, Load, QuasiStaticScenario, Shear
 
 def rows(scenario: QuasiStaticScenario, d: DerivedQuasiStatic) -> list[tuple[str, str]]:
     """Label and text of each line."""
-    walls = ", ".join(f"{angle:.4g} deg {side}" for side, angle in d.wall_friction_angles.items() if angle)
     lines = [
         ("scenario", f"{d.title}  (hash {d.hash}, seed {scenario.seed})"),
         ("grains", f"{d.grains} discs, total mass {human(d.total_mass, 'kg')} at depth {human(scenario.depth, 'm')}"),
@@ -22,7 +21,7 @@ def rows(scenario: QuasiStaticScenario, d: DerivedQuasiStatic) -> list[tuple[str
         lines.append(("packing", f"{scenario.packing.method}: takes {clock(d.packing_seconds)}"))
     lines += [
         ("stiffness", f"kn {d.kn:.4e} N/m, ks {d.ks:.4e} N/m"),
-        ("friction", f"{d.friction_angle:.4g} deg between grains, walls {walls or 'smooth'}"),
+        ("friction", f"{d.friction_angle:.4g} deg between grains, walls {_wall_friction(d)}"),
         ("cohesion", f"{human(d.cohesion, 'N')} a contact" if d.cohesion else "none"),
         (
             "gravity",
@@ -48,6 +47,17 @@ def rows(scenario: QuasiStaticScenario, d: DerivedQuasiStatic) -> list[tuple[str
         ("expected", f"{d.increments} increments, result file {human(d.file_bytes, 'B', 2)}"),
         ("  run time", f"{clock(d.run_seconds)}  (one core; collapses take longer)"),
     ]
+
+
+def _wall_friction(d: DerivedQuasiStatic) -> str:
+    """The friction of the walls that there are."""
+    there = {"walls": ("left", "right", "bottom", "top"), "membrane": ("bottom", "top"), "chain": ()}[d.boundary]
+    angles = {side: d.wall_friction_angles[side] for side in there}
+    if not any(angles.values()):
+        return "smooth" if angles else "none"
+    if len(set(angles.values())) == 1:
+        return f"{angles['bottom']:.4g} deg"
+    return ", ".join(f"{angle:.4g} deg {side}" for side, angle in angles.items())
 
 
 def _accuracy(d: DerivedQuasiStatic) -> str:

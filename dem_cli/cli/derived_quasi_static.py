@@ -176,7 +176,7 @@ def _warnings(
     said = []
     if overlap is not None and overlap > LARGE_OVERLAP:
         said.append(
-            f"grains will overlap by about {overlap:.1%} of their radius at {max(named):.4g} Pa: the stiffness may be too low"
+            f"grains will overlap by about {overlap:.1%} of their radius at {max(named) / 1e3:.4g} kPa: the stiffness may be too low"
         )
     for plan in stages:
         if plan.moved is not None and plan.moved > 1.0:
@@ -186,6 +186,6 @@ def _warnings(
             )
     if named and floor_stress > named[0]:
         said.append(
-            f"the weight of the sample presses the floor with {floor_stress:.4g} Pa, more than the first stress of {named[0]:.4g} Pa"
+            f"its weight presses the sample down with {floor_stress / 1e3:.4g} kPa, more than the first stress of {named[0] / 1e3:.4g} kPa"
         )
     return said
