@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from dem_cli.analysis.measures import Measures, measure_frame, series_row
+from dem_cli.analysis.quasi_static import IncrementMeasures, measure_increment
 from dem_cli.analysis.surface import bin_centers
 from dem_cli.analysis.void_ratio import WindowMargins
-from dem_cli.assembly import build_assembly
-from dem_cli.engines.explicit.engine import ExplicitEngine
+from dem_cli.assembly import Assembly, build_assembly
 from dem_cli.errors import RunError
 from dem_cli.interrupts import marked_interrupts
 from dem_cli.results import ResultWriter
-from dem_cli.scenario import Scenario, Shake
-from dem_cli.state import Frame
+from dem_cli.results.files import check_target
+from dem_cli.scenario import AnyScenario, QuasiStaticScenario, Scenario, Shake
+from dem_cli.state import Bonds, Frame, Grains, Increment, Ints, Walls
 
-# Told of every frame, with its row of the series where it has one.
-Listener = Callable[[Frame, Mapping[str, float] | None], None]
+# Told of every frame, with its row of the series where it has one, and of every increment, with its row.
+Listener = Callable[[Frame | Increment, Mapping[str, float] | None], None]
 
 
 def run_scenario(
-    scenario: Scenario,
+    scenario: Scenario | QuasiStaticScenario,
     target: Path,
     *,
     force: bool = False,
@@ -33,9 +37,20 @@ def run_scenario(
 ) -> Path:
     """Run a scenario and write its result file `target`; returns the file's path. packing_listener: told what the packing is at.
 
-    ResultsError if the file exists and `force` is not given, ScenarioError if the scenario cannot be run, RunError if the run blows up; after
-    that, and after Ctrl-C, what was written stays readable under the partial name (`results.partial_path`).
+    ResultsError if the file exists and `force` is not given, ScenarioError if the scenario cannot be run, RunError if the run blows up or finds
+    no equilibrium; after that, and after Ctrl-C, what was written stays readable under the partial name (`results.partial_path`).
     """
+    check_target(target, force=force)
+    assembly = assemble(scenario, packing_listener)
+    if isinstance(scenario, QuasiStaticScenario):
+        run_increments(scenario, assembly, target, force, listener)
+    else:
+        run_frames(scenario, assembly, target, force, listener)
+    return target
+
+
+def assemble(scenario: Any, packing_listener: Callable[[str], None] | None) -> Assembly:
+    """Grains and walls at the start of a scenario of any engine."""
     with marked_interrupts() as check:
 
         def tell(words: str) -> None:
@@ -43,22 +58,25 @@ def run_scenario(
             if packing_listener:
                 packing_listener(words)
 
-        assembly = build_assembly(scenario, tell)
+        return build_assembly(scenario, tell)
+
+
+def run_frames(scenario: Scenario, assembly: Assembly, target: Path, force: bool, listener: Listener | None) -> None:
+    """A run over time: frames of the explicit engine."""
+    from dem_cli.engines.explicit.engine import ExplicitEngine
+
     engine = ExplicitEngine(scenario, assembly)
-    output, container = scenario.output, scenario.container
-    surface_x = bin_centers(container.width, output.surface_bins)
-    with marked_interrupts() as engine.check, ResultWriter(
-        target, scenario_text=scenario.source, resolved_toml=scenario.resolved_toml(), scenario_hash=scenario.hash,
-        seed=scenario.seed, engine=scenario.engine, title=scenario.title, grains=assembly.grains, walls=assembly.walls,
-        depth=scenario.depth, container={"width": container.width, "height": container.height},
-        tracks=np.array(output.tracks.grains) if output.tracks else None, surface_x=surface_x, bonds=assembly.bonds,
-        force=force,
+    container, output = scenario.container, scenario.output
+    with marked_interrupts() as engine.check, begin(
+        scenario, target, force, assembly.grains, assembly.walls, {"width": container.width, "height": container.height},
+        tracks=np.array(output.tracks.grains) if output.tracks else None,
+        surface_x=bin_centers(container.width, output.surface_bins), bonds=assembly.bonds,
     ) as writer:  # fmt: skip
         for number, stage in enumerate(scenario.stages, 1):
             if isinstance(stage, Shake) and stage.motion:
                 writer.add_motion(number, stage.motion.acceleration, stage.motion.facts())
         row: dict[str, float] | None = None
-        try:
+        with warned(writer):
             for frame in engine.frames():
                 if frame.step == 0 and frame.stage_start:
                     frame = replace(frame, warnings=(*assembly.warnings, *frame.warnings))
@@ -69,11 +87,57 @@ def run_scenario(
                     listener(frame, row if measures else None)
                 engine.check()
                 del frame, measures  # large; the next ones are made before these names are bound again
-        except RunError as error:
-            writer.warn(str(error))
-            raise
         writer.finish("all stages are done")
-    return target
+
+
+def run_increments(
+    scenario: QuasiStaticScenario, assembly: Assembly, target: Path, force: bool, listener: Listener | None
+) -> None:
+    """A quasi-static test: increments of the granular element engine. The file begins with the first, as the boundary's grains are in it."""
+    from dem_cli.engines.granular_element.engine import (  # type: ignore[import-not-found, import-untyped, unused-ignore]
+        GranularElementEngine,
+    )
+
+    engine = GranularElementEngine(scenario, assembly)
+    tracks = scenario.output.tracks
+    with marked_interrupts() as engine.check:
+        increments: Iterator[Increment] = engine.increments()
+        first = next(increments)
+        first = replace(first, warnings=(*assembly.warnings, *first.warnings))
+        with begin(
+            scenario, target, force, first.grains, first.walls, {"width": first.width, "height": first.height},
+            tracks=np.array(tracks.grains) if tracks else None, boundary=first.boundary,
+        ) as writer:  # fmt: skip
+            with warned(writer):
+                for increment in chain([first], increments):
+                    measures = measure_increment(increment, scenario.depth, *scenario.stiffness)
+                    write_increment(writer, scenario, increment, measures)
+                    if listener:
+                        listener(increment, measures.row)
+                    engine.check()
+            writer.finish("all stages are done")
+
+
+def begin(
+    scenario: AnyScenario, target: Path, force: bool, grains: Grains, walls: Walls, container: Mapping[str, float | None], *,
+    tracks: Ints | None, surface_x: Any = None, bonds: Bonds | None = None, boundary: int = 0,
+) -> ResultWriter:  # fmt: skip
+    """A result file of the scenario, with nothing in it yet."""
+    return ResultWriter(
+        target, scenario_text=scenario.source, resolved_toml=scenario.resolved_toml(), scenario_hash=scenario.hash,
+        seed=scenario.seed, engine=scenario.engine, title=scenario.title, grains=grains, walls=walls, depth=scenario.depth,
+        container=container, tracks=tracks, surface_x=surface_x, bonds=bonds, boundary=boundary, force=force,
+    )  # fmt: skip
+
+
+@contextmanager
+def warned(writer: ResultWriter) -> Iterator[None]:
+    """What ends a run is told among its warnings too."""
+    try:
+        yield
+    except RunError as error:
+        writer.warn(str(error))
+        raise
 
 
 def measure(scenario: Scenario, frame: Frame) -> Measures:
@@ -105,3 +169,21 @@ def write(
         writer.warn(warning)
     if frame.stage_end and row:
         writer.end_stage(frame.time, frame.stop_reason, row)
+
+
+def write_increment(
+    writer: ResultWriter, scenario: QuasiStaticScenario, increment: Increment, measures: IncrementMeasures
+) -> None:
+    """Write an increment: a row of the series always, frame and tracks where it is due for them."""
+    stage, number = scenario.stages[increment.stage], increment.number
+    writer.append_series(measures.row, slips=increment.slips)
+    if increment.stage_start:
+        writer.begin_stage(stage.name, stage.kind, number, measures.row)
+    if "frames" in increment.due:
+        writer.append_frame(increment, measures.coordination, measures.stress)
+    if "tracks" in increment.due:
+        writer.append_tracks(number, increment.grains)
+    for warning in increment.warnings:
+        writer.warn(warning)
+    if increment.stage_end:
+        writer.end_stage(number, increment.stop_reason, measures.row)

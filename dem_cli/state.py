@@ -139,6 +139,13 @@ class Walls:
     def __len__(self) -> int:
         return len(self.name)
 
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """x of the wall left, y of bottom, x of right, y of top [m]; infinite, outwards, where there is no wall of that name."""
+        x, y = (dict(zip(self.name, ends.tolist(), strict=True)) for ends in (self.x0, self.y0))
+        far = float("inf")
+        return x.get("left", -far), y.get("bottom", -far), x.get("right", far), y.get("top", far)
+
 
 @dataclass(frozen=True)
 class Contacts:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Self
 
-from dem_cli.scenario import Scenario
-from dem_cli.state import Frame
+from dem_cli.scenario import QuasiStaticScenario, Scenario
+from dem_cli.state import Frame, Increment
 
 LOG_EVERY = 10.0  # s of wall time between two lines in a log
 PACKING_EVERY = 1.0  # s that a packing takes until it is shown, and between two lines of it in a log
@@ -18,19 +19,18 @@ SPEED_OVER = 10.0  # s of wall time that the speed is an average of
 
 
 class Progress:
-    """A listener of `run_scenario`; a context manager. verbosity -1: silent."""
+    """A listener of `run_scenario`; a context manager. verbosity -1: silent. What it says of a state is up to the kind of run."""
 
-    def __init__(self, scenario: Scenario, verbosity: int = 0) -> None:
+    def __init__(self, scenario: Scenario | QuasiStaticScenario, verbosity: int = 0) -> None:
         self.scenario = scenario
         self.silent = verbosity < 0
         self._began = self._shown = time.monotonic()
-        self._stage_began = 0.0
-        self._marks: deque[tuple[float, int]] = deque()  # wall time and step of late frames
+        self._marks: deque[tuple[float, int]] = deque()  # wall time and count of late states
         self._row: Mapping[str, float] | None = None
         self._bar: Any = None
         self._task: Any = None
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Self:
         if not self.silent and sys.stderr.isatty():
             from rich.console import Console
             from rich.progress import BarColumn, TextColumn
@@ -67,41 +67,77 @@ class Progress:
             else:
                 self.say(f"[packing] {words}")
 
-    def __call__(self, frame: Frame, row: Mapping[str, float] | None) -> None:
+    def __call__(self, state: Frame | Increment, row: Mapping[str, float] | None) -> None:
         self._row = row or self._row
-        if frame.stage_start:
-            self._stage_began = frame.time
-        if frame.step > 0:  # compiling is over
-            self._marks.append((time.monotonic(), frame.step))
+        self.begin(state)
+        count = self.count(state)
+        if count > 0:  # compiling is over
+            self._marks.append((time.monotonic(), count))
         while len(self._marks) > 2 and self._marks[-1][0] - self._marks[0][0] > SPEED_OVER:
             self._marks.popleft()
-        for warning in frame.warnings:
+        for warning in state.warnings:
             self.say(f"warning: {warning}")
-        stage = self.scenario.stages[frame.stage]
-        if frame.stage_end and self._row:
-            self.say(
-                f"stage {frame.stage + 1}/{len(self.scenario.stages)} {stage.name}: t = {frame.time:.4g} s, "
-                f"{frame.step} steps, void ratio {self._row['void_ratio']:.4f}: {frame.stop_reason}"
-            )
+        head = f"{state.stage + 1}/{len(self.scenario.stages)} {self.scenario.stages[state.stage].name}"
+        if state.stage_end and self._row:
+            self.say(f"stage {head}: {self.reached(state, self._row)}: {state.stop_reason}")
         now = time.monotonic()
-        if not self.silent and frame.step > 0 and now - self._shown >= (DRAW_EVERY if self._bar else LOG_EVERY):
+        if not self.silent and count > 0 and now - self._shown >= (DRAW_EVERY if self._bar else LOG_EVERY):
             self._shown = now
-            self._show(frame, stage.name)
+            words = self.words(state)
+            if self._bar:
+                self._bar.update(self._task, description=head, completed=self.share(state), words=words)
+            else:
+                self.say(f"[{head}] {words}")
 
-    def _show(self, frame: Frame, name: str) -> None:
-        words = self.words(frame)
-        head = f"{frame.stage + 1}/{len(self.scenario.stages)} {name}"
-        if self._bar:
-            self._bar.update(self._task, description=head, completed=self._share(frame), words=words)
-        else:
-            self.say(f"[{head}] {words}")
-
-    def words(self, frame: Frame) -> str:
-        """Simulated time, speed, time left at most, kinetic energy and void ratio."""
+    @property
+    def speed(self) -> float:
+        """Counts a second of late."""
+        if not self._marks:
+            return 0.0
         (began, first), (now, last) = self._marks[0], self._marks[-1]
-        speed = (last - first) / (now - began) if now > began else 0.0
-        left = self._steps_left(frame) / speed if speed > 0.0 else float("inf")
-        parts = [f"t = {frame.time:.3f} s", f"{speed:,.0f} steps/s", f"at most {clock(left)} left"]
+        return (last - first) / (now - began) if now > began else 0.0
+
+    def begin(self, state: Any) -> None:
+        """Told of every state before anything is said of it."""
+
+    def count(self, state: Any) -> int:
+        """What speed is counted in: time steps or increments."""
+        raise NotImplementedError
+
+    def reached(self, state: Any, row: Mapping[str, float]) -> str:
+        """Where a stage has ended."""
+        raise NotImplementedError
+
+    def words(self, state: Any) -> str:
+        """Where the run is now."""
+        raise NotImplementedError
+
+    def share(self, state: Any) -> float:
+        """How much of the run is done, 0 to 1."""
+        raise NotImplementedError
+
+
+class TimeProgress(Progress):
+    """Progress of a run over time."""
+
+    scenario: Scenario
+    _stage_began = 0.0
+
+    def begin(self, state: Frame) -> None:
+        if state.stage_start:
+            self._stage_began = state.time
+
+    def count(self, state: Frame) -> int:
+        return state.step
+
+    def reached(self, state: Frame, row: Mapping[str, float]) -> str:
+        return f"t = {state.time:.4g} s, {state.step} steps, void ratio {row['void_ratio']:.4f}"
+
+    def words(self, state: Frame) -> str:
+        """Simulated time, speed, time left at most, kinetic energy and void ratio."""
+        speed = self.speed
+        left = self._steps_left(state) / speed if speed > 0.0 else float("inf")
+        parts = [f"t = {state.time:.3f} s", f"{speed:,.0f} steps/s", f"at most {clock(left)} left"]
         if self._row:
             parts += [f"E_kin {self._row['kinetic']:.2e} J", f"e {self._row['void_ratio']:.4f}"]
         return ", ".join(parts)
@@ -113,11 +149,61 @@ class Progress:
     def _end(self, frame: Frame) -> float:
         return self._stage_began + self.scenario.stages[frame.stage].longest
 
-    def _share(self, frame: Frame) -> float:
+    def share(self, state: Frame) -> float:
         total = sum(stage.longest for stage in self.scenario.stages)
-        before = sum(stage.longest for stage in self.scenario.stages[: frame.stage])
-        here = self.scenario.stages[frame.stage].longest - (self._end(frame) - frame.time)
+        before = sum(stage.longest for stage in self.scenario.stages[: state.stage])
+        here = self.scenario.stages[state.stage].longest - (self._end(state) - state.time)
         return (before + here) / total
+
+
+class IncrementProgress(Progress):
+    """Progress of a quasi-static test."""
+
+    scenario: QuasiStaticScenario
+
+    def count(self, state: Increment) -> int:
+        return state.number
+
+    def reached(self, state: Increment, row: Mapping[str, float]) -> str:
+        return f"{state.in_stage} increments, {condition(row)}, void ratio {row['void_ratio']:.4f}"
+
+    def words(self, state: Increment) -> str:
+        """Increment of those planned, stresses and strains, iterations of the last increment, time left."""
+        planned = self.scenario.stages[state.stage].planned
+        parts = [f"increment {state.in_stage} of {'about ' if self._guessed(state) else ''}{planned}"]
+        if self._row:
+            parts.append(condition(self._row))
+        speed, left = self.speed, self._left(state)
+        parts.append(f"{state.iterations} iterations")
+        parts.append(f"{'about ' if speed > 0.0 else ''}{clock(left / speed if speed > 0.0 else float('inf'))} left")
+        return ", ".join(parts)
+
+    def _guessed(self, increment: Increment) -> bool:
+        """Between limits of stress nobody knows the strains beforehand."""
+        return self.scenario.stages[increment.stage].kind == "cyclic"
+
+    def _left(self, increment: Increment) -> int:
+        later = sum(stage.planned for stage in self.scenario.stages[increment.stage + 1 :])
+        return max(self.scenario.stages[increment.stage].planned - increment.in_stage, 0) + later
+
+    def share(self, state: Increment) -> float:
+        return 1.0 - self._left(state) / max(1, self.scenario.planned)
+
+
+def condition(row: Mapping[str, float]) -> str:
+    """Stresses and strains of a sample in few words: shear strain, s1/s2 and volumetric strain once it is sheared, else the mean stress."""
+    if row["shear_strain"] == 0.0:
+        return f"mean stress {row['mean_stress'] / 1000.0:.4g} kPa"
+    words = f"shear strain {100.0 * row['shear_strain']:.3g} %, s1/s2 {row['stress_ratio']:.3f}"
+    words += f", volumetric strain {100.0 * row['volumetric_strain']:.3g} %"
+    return (
+        words if math.isnan(row["pore_pressure"]) else f"{words}, pore pressure {row['pore_pressure'] / 1000.0:.4g} kPa"
+    )
+
+
+def progress_of(scenario: Scenario | QuasiStaticScenario, verbosity: int = 0) -> Progress:
+    """The listener for a scenario's kind of run."""
+    return (TimeProgress if isinstance(scenario, Scenario) else IncrementProgress)(scenario, verbosity)
 
 
 def clock(seconds: float) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 import click
 
 from dem_cli.cli import INTERRUPTED, Settings
-from dem_cli.errors import ScenarioError
 
 
 @click.command(name="run", short_help="Run a scenario; write a result file.")
@@ -27,21 +26,19 @@ def command(
     The result file is SCENARIO's name with .h5 in the present folder; it grows under NAME.partial.h5 and takes its own name when
     it is complete. Ctrl-C ends the run with exit code 130, and a blow-up with 1; what was written stays readable. Progress goes to stderr.
     """
-    from dem_cli.results.writer import check_target, partial_path
-    from dem_cli.scenario import Scenario, load_scenario
+    from dem_cli.results.files import check_target, partial_path
+    from dem_cli.scenario import load_scenario
 
     loaded = load_scenario(scenario, overrides)
-    if not isinstance(loaded, Scenario):
-        raise ScenarioError(f'{scenario}: engine = "{loaded.engine}" is not run by this version. Try dem check')
     target = output or Path(scenario.with_suffix(".h5").name)
     check_target(target, force=force)
 
-    from dem_cli.cli.progress import Progress, clock
+    from dem_cli.cli.progress import clock, progress_of
     from dem_cli.jit import is_cold
     from dem_cli.run import run_scenario
 
     began = time.monotonic()
-    with Progress(loaded, settings.verbosity) as progress:
+    with progress_of(loaded, settings.verbosity) as progress:
         progress.say(f"{loaded.title}: {loaded.grain_count} grains, {len(loaded.stages)} stages, to {target}")
         if is_cold():
             progress.say("compiling the kernels, once after installation: up to a minute")

@@ -1,14 +1,20 @@
 """Result files: names and units (`schema`), the writer and the reader."""
 
+from dem_cli.results.dissipation import Dissipation
+from dem_cli.results.files import partial_path
+from dem_cli.results.frames import StoredFrame, StoredIncrement
 from dem_cli.results.motions import StoredMotion
-from dem_cli.results.reader import Results, Stage, StoredFrame, Surface, Tracks, open_results
-from dem_cli.results.writer import ResultWriter, partial_path
+from dem_cli.results.reader import Results, Surface, Tracks, open_results
+from dem_cli.results.stages import Stage
+from dem_cli.results.writer import ResultWriter
 
 __all__ = [
+    "Dissipation",
     "ResultWriter",
     "Results",
     "Stage",
     "StoredFrame",
+    "StoredIncrement",
     "StoredMotion",
     "Surface",
     "Tracks",

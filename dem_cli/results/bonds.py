@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dem_cli.results.schema import BOND_STRAIN, BONDS
-from dem_cli.results.tables import Table, describe, make_scale
+from dem_cli.results.tables import TIME, Table, describe, make_scale
 from dem_cli.state import Bonds, BondStrain
 
 
@@ -21,7 +21,7 @@ def create_bonds(file: Any, bonds: Bonds) -> Table | None:
         dataset = group.create_dataset(name, data=getattr(bonds, name))
         describe(dataset, unit, definition)
         dataset.dims[0].attach_scale(axis)
-    return Table(group, BOND_STRAIN, axis)
+    return Table(group, BOND_STRAIN, TIME, axis)
 
 
 def append_strain(table: Table | None, time: float, strain: BondStrain | None) -> None:

@@ -6,7 +6,7 @@ import math
 import time
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,41 +16,20 @@ import numpy as np
 
 from dem_cli.errors import ResultsError
 from dem_cli.results.bonds import read_bonds, read_strain
+from dem_cli.results.dissipation import Dissipation, read_dissipation, read_slips
+from dem_cli.results.files import partial_path
+from dem_cli.results.frames import StoredFrame, StoredIncrement, stored_frame, stored_increment
+from dem_cli.results.layouts import Layout, layout_over
 from dem_cli.results.motions import StoredMotion, read_motions
-from dem_cli.results.schema import FORMAT, FORMAT_VERSION, FRAMES, KIND_CONTACT, KIND_WALL_CONTACT, SERIES, TRACKS
-from dem_cli.results.vtkhdf import GROUND, read_energy
-from dem_cli.results.writer import partial_path
-from dem_cli.state import Bonds, Contacts, Floats, Frame, Grains, Ints, Walls
-
-
-@dataclass(frozen=True, kw_only=True)
-class StoredFrame(Frame):
-    """A frame read back: as it was written, bit for bit, but for `forces`, `warnings` and `stop_reason`, which are not kept.
-
-    coordination (n,). stress (n, 4) [Pa]: xx, xy, yx, yy, in single precision.
-    """
-
-    walls: Walls
-    coordination: Ints
-    stress: Floats
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One stage of the run: `before` and `after` are the series rows at its ends, {} where there is none; end NaN if it goes on."""
-
-    name: str
-    kind: str
-    start: float
-    end: float
-    reason: str
-    before: dict[str, float]
-    after: dict[str, float]
+from dem_cli.results.schema import FORMAT, FORMAT_VERSION, KIND_CONTACT, KIND_WALL_CONTACT
+from dem_cli.results.stages import Stage, read_stages
+from dem_cli.results.walls import ENDS, read_walls
+from dem_cli.state import Bonds, Contacts, Floats, Grains, Ints, Walls
 
 
 @dataclass(frozen=True)
 class Tracks:
-    """Followed grains: ids (g,), time (t,) [s], arrays: name of schema.TRACKS -> (t, g)."""
+    """Followed grains: ids (g,), time (t,) [s], or numbers of increments, arrays: name of the layout's tracks -> (t, g)."""
 
     ids: Ints
     time: Floats
@@ -67,11 +46,11 @@ class Surface:
 
 
 class Series(Mapping[str, Floats]):
-    """Name -> values over time, each read when asked for."""
+    """Name -> values over time or increments, each read when asked for."""
 
-    def __init__(self, group: Any) -> None:
+    def __init__(self, group: Any, layout: Layout) -> None:
         self._group = group
-        self._names = [name for name in SERIES if name in group]
+        self._names = [name for name in layout.series if name in group]
         self.rows = int(group.attrs["rows"])  # columns may be longer while a flush goes on
 
     def __getitem__(self, name: str) -> Floats:
@@ -107,7 +86,10 @@ class Results:
         self.height = None if math.isnan(height) else height  # None: walls without end
         self.grain_count = int(self.attrs["grains"])
         self.element_count = int(self.attrs.get("elements", self.grain_count))  # format 1 knew discs only
-        self.series = Series(file["series"])
+        self.layout = layout_over(self.attrs.get("axis", "time"))  # files of format 1 and early ones of 2 do not tell
+        self.axis = self.layout.axis.name  # "time" or "increment"
+        self.boundary = int(self.attrs.get("boundary", 0))  # grains of the boundary, the last of the elements
+        self.series = Series(file["series"], self.layout)
         self.n_frames = int(file["VTKHDF/Steps"].attrs["NSteps"])
 
     @property
@@ -126,9 +108,8 @@ class Results:
 
     @cached_property
     def walls(self) -> Walls:
-        group = self._file["walls"]
-        ends = {name: np.asarray(group[name][:]) for name in ("x0", "y0", "x1", "y1", "friction")}
-        return Walls(name=tuple(group["name"].asstr()[:]), **ends)
+        """Where they were at the start; those of a quasi-static test move, so see `StoredIncrement.walls`."""
+        return read_walls(self._file)
 
     @cached_property
     def bonds(self) -> Bonds:
@@ -136,27 +117,7 @@ class Results:
 
     @cached_property
     def stages(self) -> list[Stage]:
-        group = self._file["stages"]
-        names = list(group["quantity"].asstr()[:])
-        count = int(group.attrs["rows"])
-        texts = {name: group[name].asstr()[:count] for name in ("name", "kind", "reason")}
-        numbers = {name: group[name][:count] for name in ("start", "end", "before", "after")}
-
-        def measures(row: Floats) -> dict[str, float]:
-            return {} if np.all(np.isnan(row)) else dict(zip(names, row.tolist(), strict=True))
-
-        return [
-            Stage(
-                name=str(texts["name"][k]),
-                kind=str(texts["kind"][k]),
-                start=float(numbers["start"][k]),
-                end=float(numbers["end"][k]),
-                reason=str(texts["reason"][k]),
-                before=measures(numbers["before"][k]),
-                after=measures(numbers["after"][k]),
-            )
-            for k in range(count)
-        ]
+        return read_stages(self._file)
 
     @cached_property
     def warnings(self) -> list[str]:
@@ -173,47 +134,61 @@ class Results:
             return None
         group = self._file["tracks"]
         rows = int(group.attrs["rows"])
-        arrays = {name: np.asarray(group[name][:rows]) for name in TRACKS}
-        return Tracks(ids=np.asarray(group["grain"][:]), time=np.asarray(group["time"][:rows]), arrays=arrays)
+        arrays = {name: np.asarray(group[name][:rows]) for name in self.layout.tracks}
+        return Tracks(ids=np.asarray(group["grain"][:]), time=np.asarray(group[self.axis][:rows]), arrays=arrays)
 
     @cached_property
     def surface(self) -> Surface:
+        """ResultsError in files of quasi-static tests, which have none."""
+        if not self.layout.surface:
+            raise ResultsError(f"{self.path}: a quasi-static test has no free surface")
         group = self._file["surface"]
         rows = int(group.attrs["rows"])
         return Surface(np.asarray(group["x"][:]), np.asarray(group["time"][:rows]), np.asarray(group["eta"][:rows]))
 
     @cached_property
+    def dissipation(self) -> Dissipation | None:
+        """The contacts that dissipate most, a row for each of the series; None in files of runs over time."""
+        return read_dissipation(self._file)
+
+    @cached_property
     def frame_times(self) -> Floats:
-        """Times of the frames, shape (n_frames,) [s]."""
+        """Where the frames lie on the axis, shape (n_frames,): times [s], or numbers of increments."""
         return np.asarray(self._file["VTKHDF/Steps/Values"][: self.n_frames])
 
-    def frame(self, k: int) -> StoredFrame:
-        """Frame k, counted from the end if negative. Raises IndexError."""
+    def frame(self, k: int) -> Any:
+        """Frame k, counted from the end if negative: a StoredFrame, or a StoredIncrement in files over increments. Raises IndexError."""
+        return self.increment(k) if self.axis == "increment" else self.instant(k)
+
+    def instant(self, k: int) -> StoredFrame:
+        """Frame k of a run over time. Raises IndexError, and ResultsError if the file is over increments."""
+        k, row = self._frame_row(k, "time")
+        grains, coordination, stress = self._grains(k)
+        contacts, strain = self._contacts(k, len(grains)), read_strain(self._file, k)
+        return stored_frame(row, grains, contacts, strain, self.walls, coordination, stress)
+
+    def increment(self, k: int) -> StoredIncrement:
+        """Frame k of a quasi-static test. Raises IndexError, and ResultsError if the file is over time."""
+        k, row = self._frame_row(k, "increment")
+        grains, coordination, stress = self._grains(k)
+        contacts, slips = self._contacts(k, len(grains)), read_slips(self._file, int(row["row"]))
+        walls = self._walls(k, len(grains))
+        return stored_increment(row, grains, contacts, slips, walls, self.boundary, coordination, stress)
+
+    def _frame_row(self, k: int, axis: str) -> tuple[int, dict[str, float]]:
+        if self.axis != axis:
+            raise ResultsError(f"{self.path}: its frames are over {self.axis}, not over {axis}")
         if not -self.n_frames <= k < self.n_frames:
             raise IndexError(f"frame {k} of {self.n_frames}")
         k %= self.n_frames
-        row = {name: float(self._file["frames"][name][k]) for name in FRAMES if name in self._file["frames"]}
-        grains, coordination, stress = self._grains(k)
-        return StoredFrame(
-            step=int(row["step"]),
-            time=row["time"],
-            dt=row["time_step"],
-            stage=int(row["stage"]),
-            grains=grains,
-            ground=np.array([row[name] for name in GROUND]).reshape(3, 2),
-            energy=read_energy(row),
-            residual=row["residual"],
-            energy_in=row["energy_in"],
-            due=frozenset({"frames"}),
-            contacts=self._contacts(k, len(grains)),
-            bonds=read_strain(self._file, k),
-            unbalanced=row["unbalanced"],
-            stage_start=bool(row["stage_start"]),
-            stage_end=bool(row["stage_end"]),
-            walls=self.walls,
-            coordination=coordination,
-            stress=stress,
-        )
+        group = self._file["frames"]
+        return k, {name: float(group[name][k]) for name in self.layout.frames if name in group}
+
+    def _walls(self, k: int, n: int) -> Walls:
+        """The walls of frame k, whose ends are the first helper points."""
+        first = int(self._file["VTKHDF/Steps/PointOffsets"][k]) + n
+        ends = self._file["VTKHDF/Points"][first : first + 2 * len(self.walls), :2].reshape(-1, 4)
+        return replace(self.walls, **dict(zip(ENDS, ends.T.copy(), strict=True)))
 
     def _grains(self, k: int) -> tuple[Grains, Ints, Floats]:
         root, data = self._file["VTKHDF"], self._file["VTKHDF/PointData"]

@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 FORMAT = "dem-cli results"
-FORMAT_VERSION = 2  # 1: discs only; no semi-axes, bodies or bonds, and `grains` counts what `elements` counts now
+# 1: discs only; no semi-axes, bodies or bonds, and `grains` counts what `elements` counts now. 2: runs over time. 3: the layout of runs over
+# increments came along; runs over time are written as 2 still.
+FORMAT_VERSION = 3
 
 # Series over time: name -> (unit, definition). The writer stores both as attributes of the dataset.
 SERIES: dict[str, tuple[str, str]] = {
@@ -180,6 +182,23 @@ FRAMES: dict[str, tuple[str, str]] = {
     "stage_start": ("1", "1 where a stage begins"),
     "stage_end": ("1", "1 where a stage ends"),
 }
+
+# What a frame of a quasi-static test holds beside grains, contacts and walls, over /frames/increment.
+INCREMENT_FRAMES: dict[str, tuple[str, str]] = {
+    **{name: INCREMENTS[name] for name in ("increment", "stage", "in_stage", "axial", "width", "height")},
+    "area": ("m^2", "area of the sample, inside walls or chains"),
+    **{
+        name: INCREMENTS[name]
+        for name in (
+            "stress_x", "stress_y", "strain_x", "strain_y", "pore_pressure",
+            "work", "body_work", "elastic_normal", "elastic_tangential", "elastic_membrane", "friction", "released", "residual",
+            "balance", "unbalanced", "iterations", "sub_steps", "rung", "event",
+        )
+    },
+    "stage_start": FRAMES["stage_start"],
+    "stage_end": FRAMES["stage_end"],
+    "row": ("1", "row of /series that belongs to the frame, from 0; -1 if there is none"),
+}  # fmt: skip
 
 # Bonds between elements of a grain, over /bonds/bond; there is no such group where there are none.
 BONDS: dict[str, tuple[str, str]] = {

@@ -8,7 +8,7 @@ times the time of writing.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -16,6 +16,18 @@ import numpy.typing as npt
 
 ROWS_PER_CHUNK = 512
 TEXT = h5py.string_dtype("utf-8")
+
+
+class Axis(NamedTuple):
+    """What the rows of a table are counted by."""
+
+    name: str
+    unit: str
+    definition: str
+
+
+TIME = Axis("time", "s", "simulated time")
+INCREMENT = Axis("increment", "1", "number of increments done, 0 the start")
 
 
 class Rows:
@@ -81,41 +93,54 @@ def make_scale(group: Any, name: str, values: Any, unit: str, definition: str) -
 
 
 class Table:
-    """Named columns over time in one group; each a dataset of shape (times,) or (times, len(axis)).
+    """Named columns over time, or over increments, in one group; each a dataset of shape (rows,) or (rows, len(across)).
 
-    columns: name -> (unit, definition); `time` is a column of its own, made first. axis: scale of the second dimension.
+    columns: name -> (unit, definition); `axis` is a column of its own, made first. across: scale of the second dimension.
+    whole: columns of whole numbers.
     """
 
-    def __init__(self, group: Any, columns: Mapping[str, tuple[str, str]], axis: Any = None) -> None:
-        self.names = tuple(name for name in columns if name != "time")
-        self._wide = axis is not None
-        self._width = 1 if axis is None else len(axis)
+    def __init__(
+        self,
+        group: Any,
+        columns: Mapping[str, tuple[str, str]],
+        axis: Axis,
+        across: Any = None,
+        whole: Sequence[str] = (),
+    ) -> None:
+        self.names = tuple(name for name in columns if name != axis.name)
+        self._across = across
+        self._width = 1 if across is None else len(across)
         self._pending: list[npt.NDArray[np.float64]] = []
-        self._times: list[float] = []
-        time = group.create_dataset("time", (0,), "f8", maxshape=(None,), chunks=(ROWS_PER_CHUNK,))
-        time.make_scale("time")
-        describe(time, "s", "simulated time")
-        self._columns = [self._column(group, name, *columns[name], time, axis) for name in self.names]
-        self._time = Rows(time)
+        self._places: list[float] = []
+        scale = group.create_dataset(axis.name, (0,), "f8", maxshape=(None,), chunks=(ROWS_PER_CHUNK,))
+        scale.make_scale(axis.name)
+        describe(scale, axis.unit, axis.definition)
+        self._columns = [
+            self._column(group, name, *columns[name], scale, "i4" if name in whole else "f8") for name in self.names
+        ]
+        self._scale = Rows(scale)
         self._attrs = group.attrs
         self._attrs["rows"] = 0
 
-    def _column(self, group: Any, name: str, unit: str, definition: str, time: Any, axis: Any) -> Rows:
-        inner = () if axis is None else (len(axis),)
+    def _column(self, group: Any, name: str, unit: str, definition: str, scale: Any, dtype: str) -> Rows:
+        inner = () if self._across is None else (self._width,)
         per_chunk = max(1, min(ROWS_PER_CHUNK, 65536 // (8 * max(1, self._width))))
         chunks = (per_chunk, *(max(1, width) for width in inner))
-        dataset = group.create_dataset(name, (0, *inner), "f8", maxshape=(None, *inner), chunks=chunks)
+        dataset = group.create_dataset(name, (0, *inner), dtype, maxshape=(None, *inner), chunks=chunks)
         describe(dataset, unit, definition)
-        dataset.dims[0].attach_scale(time)
-        if axis is not None:
-            dataset.dims[1].attach_scale(axis)
+        dataset.dims[0].attach_scale(scale)
+        if self._across is not None:
+            dataset.dims[1].attach_scale(self._across)
         return Rows(dataset)
 
-    def append(self, time: float, values: Sequence[Any]) -> int:
-        """Keep one row until the next flush: a number, or an array along the axis, for each column. Returns its bytes."""
+    def append(self, place: float, values: Sequence[Any]) -> int:
+        """Keep one row until the next flush: a number, or an array across, for each column. Returns its bytes.
+
+        place: on the axis of the table.
+        """
         row = np.array(values, dtype=np.float64).reshape(len(self.names), self._width)
         self._pending.append(row)
-        self._times.append(float(time))
+        self._places.append(float(place))
         return row.nbytes
 
     def flush(self) -> None:
@@ -123,13 +148,13 @@ class Table:
         if not self._pending:
             return
         block = np.stack(self._pending, axis=1)  # (columns, rows, width)
-        times = np.array(self._times)
+        places = np.array(self._places)
         self._pending.clear()
-        self._times.clear()
+        self._places.clear()
         for column, values in zip(self._columns, block, strict=True):
-            column.append(values if self._wide else values[:, 0])
-        self._time.append(times)
+            column.append(values[:, 0] if self._across is None else values)
+        self._scale.append(places)
 
     def commit(self) -> None:
         """Count the rows handed over so far, once they have reached the file: what a reader may trust after a kill."""
-        self._attrs.modify("rows", self._time.rows)
+        self._attrs.modify("rows", self._scale.rows)

@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dem_cli.results.bonds import append_strain, create_bonds
+from dem_cli.results.frames import frame_row, place
+from dem_cli.results.layouts import Layout
 from dem_cli.results.schema import (
     CELL_DATA,
-    FRAMES,
     KIND_BOND,
     KIND_CONTACT,
     KIND_NOTHING,
@@ -28,50 +29,22 @@ from dem_cli.results.schema import (
     Column,
 )
 from dem_cli.results.tables import ROWS_PER_CHUNK, Rows, Table, describe
-from dem_cli.state import Bonds, Contacts, Energy, Floats, Frame, Grains, Ints, Walls
+from dem_cli.results.walls import box_corners, drawn_walls
+from dem_cli.state import Bonds, Contacts, Floats, Frame, Grains, Increment, Ints, Walls
 
 Arrays = dict[str, tuple[npt.NDArray[Any], ...]]
-ENERGY = {  # field of Energy -> name in the file
-    "kinetic": "kinetic",
-    "potential": "potential",
-    "elastic_normal": "elastic_normal",
-    "elastic_tangential": "elastic_tangential",
-    "friction": "friction",
-    "dashpot_normal": "dashpot_normal",
-    "dashpot_tangential": "dashpot_tangential",
-    "bonds": "bond_energy",
-    "damping": "damping",
-    "escaped": "escaped_energy",
-    "time_step": "time_step_energy",
-    "work": "work",
-}
-GROUND = ("ground_x", "ground_y", "ground_vx", "ground_vy", "ground_ax", "ground_ay")
-
-
-def drawn_walls(walls: Walls, grains: Grains) -> Floats:
-    """Ends of the walls as they are drawn, shape (2 w, 2) [m]: walls without end are cut where the first grains end."""
-    x, y = np.stack([walls.x0, walls.x1], axis=1).ravel(), np.stack([walls.y0, walls.y1], axis=1).ravel()
-    ends = np.stack([x, y], axis=1)
-    if len(grains) == 0 or len(ends) == 0:
-        return np.nan_to_num(ends, posinf=0.0, neginf=0.0)
-    for axis, center in ((0, grains.x), (1, grains.y)):
-        low, high = float(np.min(center - grains.a)), float(np.max(center + grains.a))
-        reach = 10.0 * float(np.ptp(np.concatenate([grains.x, grains.y])) + 2.0 * np.max(grains.a))
-        column = ends[:, axis]
-        near = column[np.isfinite(column) & (column > low - reach) & (column < high + reach)]
-        ends[:, axis] = np.clip(column, min([low, *near]), max([high, *near]))
-    return ends
 
 
 class FrameWriter:
     """Appends frames to /VTKHDF and /frames of an open file; `commit` makes them visible to readers of the format."""
 
-    def __init__(self, file: Any, grains: Grains, walls: Walls, bonds: Bonds) -> None:
+    def __init__(self, file: Any, layout: Layout, grains: Grains, walls: Walls, bonds: Bonds) -> None:
+        self._layout = layout
         self._n = len(grains)
         self._fixed = {name: getattr(grains, name).copy() for name in ("radius", "a", "b", "body")}
         self._turning = bool(np.any(grains.a != grains.b))
         self._columns = {**POINT_DATA, **({"shape": TURNING_SHAPE} if self._turning else {})}
-        self._walls = drawn_walls(walls, grains)
+        self._walls = box_corners(walls, grains) if layout.moving else drawn_walls(walls, grains)
         self._bonds = np.stack([bonds.i, bonds.j], axis=1)
         # A quarter of the elements a chunk: small enough that the empty part of contact data falls into chunks never written.
         self._chunk = int(2 ** np.clip(np.ceil(np.log2(max(1, self._n) / 4)), 8, 16))
@@ -92,7 +65,7 @@ class FrameWriter:
         if not self._turning:
             self._once["shape"] = (2.0 * grains.radius, 2.0 * grains.radius)
         self._strain = create_bonds(file, bonds)
-        self._table = Table(file.create_group("frames"), FRAMES)
+        self._table = Table(file.create_group("frames"), layout.frames, layout.axis)
 
     def _column(self, group: Any, name: str, column: Column) -> Any:
         wide = column.width > 1
@@ -162,25 +135,29 @@ class FrameWriter:
         group = self._root.create_group(name)
         return {column: self._rows(group, column, columns[column]) for column in columns}
 
-    def size(self, frame: Frame) -> int:
+    def size(self, frame: Frame | Increment) -> int:
         """Bytes that a frame takes, to within a few percent."""
         elements = (87 if self._turning else 71) * self._n
         return elements + 90 * (0 if frame.contacts is None else len(frame.contacts)) + 43 * len(self._bonds)
 
-    def append(self, frame: Frame, coordination: Ints, stress: Floats) -> int:
-        """Hand one frame to HDF5. coordination (n,), stress (n, 4) [Pa]: xx, xy, yx, yy. Returns its bytes."""
+    def append(self, frame: Frame | Increment, coordination: Ints, stress: Floats, row: int = -1) -> int:
+        """Hand one frame to HDF5. coordination (n,), stress (n, 4) [Pa]: xx, xy, yx, yy. row: of /series. Returns its bytes."""
         grains, contacts = frame.grains, frame.contacts
         if contacts is None:
             raise ValueError("a frame without contacts cannot be written")
         if not all(np.array_equal(getattr(grains, name), values) for name, values in self._fixed.items()):
             raise ValueError("the grains of a frame are not those that the file was begun with")
-        append_strain(self._strain, frame.time, frame.bonds)
+        if isinstance(frame, Increment):
+            if 2 * len(frame.walls) != len(self._walls):
+                raise ValueError("the walls of a frame are not those that the file was begun with")
+            self._walls = box_corners(frame.walls, grains)
+        else:
+            append_strain(self._strain, frame.time, frame.bonds)
         feet = np.flatnonzero(contacts.j < 0)
         ends = len(self._walls)
         points = self._n + ends + len(feet)
-        lines = max(
-            1, len(contacts) + ends // 2 + len(self._bonds)
-        )  # a step with no line would make VTK misread the next one
+        # a step with no line would make VTK misread the next one
+        lines = max(1, len(contacts) + ends // 2 + len(self._bonds))
 
         for axis, center, foot in ((0, grains.x, contacts.px), (1, grains.y, contacts.py)):
             column = np.concatenate([center, self._walls[:, axis], foot[feet]])
@@ -194,8 +171,8 @@ class FrameWriter:
         contact_arrays = _of_contacts(contacts, lines, ends // 2, len(self._bonds))
         self._write(self._cell_data, CELL_DATA, first, lines, contact_arrays)
         self._append_lines(contacts, feet, lines)
-        self._append_step(frame.time, points, lines)
-        self._table.append(frame.time, frame_row(frame)[1:])
+        self._append_step(place(frame), points, lines)
+        self._table.append(place(frame), frame_row(frame, row))
         self._points += points
         self._cells += self._n + lines
         self._lines += lines
@@ -310,26 +287,3 @@ def _of_contacts(contacts: Contacts, lines: int, walls: int, bonds: int) -> Arra
         "normal": (contacts.nx, contacts.ny),
         "contact_point": (contacts.px, contacts.py),
     }
-
-
-def frame_row(frame: Frame) -> list[float]:
-    """The numbers of a frame in the order of FRAMES."""
-    values: dict[str, float] = {
-        "time": frame.time,
-        "step": frame.step,
-        "stage": frame.stage,
-        "time_step": frame.dt,
-        "residual": frame.residual,
-        "energy_in": frame.energy_in,
-        "unbalanced": frame.unbalanced,
-        "stage_start": frame.stage_start,
-        "stage_end": frame.stage_end,
-        **dict(zip(GROUND, np.ravel(frame.ground).tolist(), strict=True)),
-        **{name: getattr(frame.energy, field) for field, name in ENERGY.items()},
-    }
-    return [values[name] for name in FRAMES]
-
-
-def read_energy(row: Mapping[str, float]) -> Energy:
-    """What an old file does not know of is 0."""
-    return Energy(**{field: row.get(name, 0.0) for field, name in ENERGY.items()})
