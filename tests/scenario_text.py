@@ -34,7 +34,12 @@ ABSENT = _Absent()
 
 def small(changes: dict[str, Any] | None = None) -> str:
     """SMALL with keys set ("contact.friction", "stage.1.ramp"; lists count from 0), or left out where the value is ABSENT."""
-    data = copy.deepcopy(SMALL)
+    return changed(SMALL, changes)
+
+
+def changed(data: dict[str, Any], changes: dict[str, Any] | None) -> str:
+    """A scenario's TOML data with changes, as text."""
+    data = copy.deepcopy(data)
     for path, value in (changes or {}).items():
         *parents, last = path.split(".")
         table: Any = data

@@ -10,7 +10,8 @@ import click
 
 if TYPE_CHECKING:
     from dem_cli.cli.derived import Derived
-    from dem_cli.scenario import Scenario
+    from dem_cli.cli.derived_quasi_static import DerivedQuasiStatic
+    from dem_cli.scenario import QuasiStaticScenario, Scenario
 
 
 @click.command(name="check", short_help="Check a scenario; print derived constants, time step, run time.")
@@ -22,26 +23,43 @@ def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved:
     """Check SCENARIO without running it.
 
     Prints all mistakes, or what follows from the scenario: sizes and masses, stiffness and wave speeds, the time step beside its
-    stability limit and the thesis' rule, and the steps, file size and run time to expect.
+    stability limit and the thesis' rule, and the steps, file size and run time to expect. Of quasi-static tests: the box and its void
+    ratio, accuracy in force, expected overlap, and the increments of each stage.
     """
-    from dem_cli.scenario import Scenario, load_scenario
+    from dem_cli.scenario import load_scenario
 
     loaded = load_scenario(scenario, overrides)
-    if resolved or not isinstance(loaded, Scenario):
+    if resolved:
         click.echo(loaded.resolved_toml(), nl=False)
         return
-    from dem_cli.cli.derived import derive
-
-    derived = derive(loaded)
+    derived, lines = derive_any(loaded)
     if as_json:
         import json
 
         click.echo(json.dumps(derived.as_dict(), indent=2, ensure_ascii=False))
         return
-    for label, text in rows(loaded, derived):
+    for label, text in lines:
         click.echo(f"{label:<18}{text}".rstrip())
     for warning in derived.warnings:
         click.echo(f"warning: {warning}", err=True)
+
+
+def derive_any(
+    scenario: Scenario | QuasiStaticScenario,
+) -> tuple[Derived | DerivedQuasiStatic, list[tuple[str, str]]]:
+    """What follows from a scenario, and the lines that say it, by its engine."""
+    from dem_cli.scenario import Scenario
+
+    if isinstance(scenario, Scenario):
+        from dem_cli.cli.derived import derive
+
+        derived = derive(scenario)
+        return derived, rows(scenario, derived)
+    from dem_cli.cli.check_quasi_static import rows as quasi_static_rows
+    from dem_cli.cli.derived_quasi_static import derive_quasi_static
+
+    found = derive_quasi_static(scenario)
+    return found, quasi_static_rows(scenario, found)
 
 
 def rows(scenario: Scenario, d: Derived) -> list[tuple[str, str]]:
@@ -188,9 +206,9 @@ def scientific(values: tuple[float, float, float], unit: str) -> str:
 
 def human(value: float, unit: str, digits: int = 4) -> str:
     """A value with a prefix that suits its size: 0.005 m is 5 mm."""
-    if unit in ("m", "s", "B"):
+    if unit in ("m", "s", "B", "Pa"):
         for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6)):
-            if abs(value) >= factor and (unit == "B" or factor <= 1.0):
+            if abs(value) >= factor and (unit in ("B", "Pa") or factor <= 1.0):
                 return f"{float(f'{value / factor:.{digits}g}'):g} {prefix}{unit}"
     return f"{value:.{digits}g} {unit}"
 

@@ -1,4 +1,4 @@
-"""What follows from a scenario before it is run: constants, time step, expected steps, size and time. For `dem check`."""
+"""What follows from a scenario of explicit DEM before it is run: constants, time step, expected steps, size and time. For `dem check`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_cli.scenario import Scenario, Settle, Shake
+from dem_cli.scenario import AnyScenario, Scenario, Settle, Shake
 from dem_cli.scenario.packing import USUAL
 from dem_cli.scenario.restitution import restitution
 from dem_cli.state import Floats
@@ -18,7 +18,14 @@ from dem_cli.state import Floats
 RATE_GRAIN_STEPS = {"disc": 40e6, "ellipse": 12e6, "bonded": 24e6, "clump": 24e6}
 SERIES_COLUMNS = 46  # numbers of a row of /series, 8 bytes each
 # Seconds that a packing takes, a grain: discs, and by how much other shapes take longer. Measured with 500 and 3000 grains; a guess for others.
-PACKING_SECONDS = {"falling": 1e-5, "rejection": 1e-5, "local-move": 2e-3, "growth": 1.5e-3, "insertion": 6e-4}
+PACKING_SECONDS = {
+    "falling": 1e-5,
+    "rejection": 1e-5,
+    "local-move": 2e-3,
+    "growth": 1.5e-3,
+    "insertion": 6e-4,
+    "overlapping": 1e-6,
+}
 PACKING_FACTOR = {"disc": 1.0, "ellipse": 5.0, "bonded": 2.5, "clump": 2.5}
 LOOSE_SETTLING, DENSE_SETTLING = 0.6, 0.3  # s, until packings are at rest that begin loose, or dense
 POROSITY = 0.18  # of a bed that has fallen into place; for estimates only
@@ -116,21 +123,21 @@ def derive(scenario: Scenario) -> Derived:
         shape=shape,
         grains=len(mass),
         elements=len(elements),
-        radius=_spread(radius),
-        semi_major=_spread(elements.a) if shape == "ellipse" else None,
-        semi_minor=_spread(elements.b) if shape == "ellipse" else None,
+        radius=spread_of(radius),
+        semi_major=spread_of(elements.a) if shape == "ellipse" else None,
+        semi_minor=spread_of(elements.b) if shape == "ellipse" else None,
         template_area=template.area * scenario.grains.scale**2 if template else None,
-        area=_spread(mass / (scenario.grains.density * scenario.depth)),
-        mass=_spread(mass),
+        area=spread_of(mass / (scenario.grains.density * scenario.depth)),
+        mass=spread_of(mass),
         total_mass=float(mass.sum()),
         bonds=len(bonds),
-        bond_normal=_spread(bonds.normal) if len(bonds) else None,
-        bond_tangential=_spread(bonds.tangential) if len(bonds) else None,
-        bond_rolling=_spread(bonds.rolling) if len(bonds) else None,
-        bond_lambda=_spread(bonds.normal * dt / reduced) if len(bonds) else None,
+        bond_normal=spread_of(bonds.normal) if len(bonds) else None,
+        bond_tangential=spread_of(bonds.tangential) if len(bonds) else None,
+        bond_rolling=spread_of(bonds.rolling) if len(bonds) else None,
+        bond_lambda=spread_of(bonds.normal * dt / reduced) if len(bonds) else None,
         bond_creep=creep,
         packing_height=_packing_height(scenario, float(mass.sum())),
-        packing_seconds=_packing_seconds(scenario, len(mass)),
+        packing_seconds=packing_seconds(scenario, len(mass)),
         vp=vp,
         vs=vs,
         kn=kn,
@@ -151,7 +158,7 @@ def derive(scenario: Scenario) -> Derived:
     )
 
 
-def _spread(values: Floats) -> Spread:
+def spread_of(values: Floats) -> Spread:
     """Smallest, mean and largest; the mean of equal values is exactly their value."""
     low, high = float(values.min()), float(values.max())
     return low, min(max(float(values.mean()), low), high), high
@@ -193,7 +200,7 @@ def _packing_height(scenario: Scenario, mass: float) -> float | None:
     return packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
 
 
-def _packing_seconds(scenario: Scenario, grains: int) -> float:
+def packing_seconds(scenario: AnyScenario, grains: int) -> float:
     """Time that the packing itself takes [s], a guess."""
     if not scenario.packing.random:
         return 0.0

@@ -102,12 +102,13 @@ class Packing(Table):
         """Whether the places are made by chance: neither a grid to fall from nor a file gives them."""
         return not self.file and not (self.method == "falling" and self.grid)
 
-    def region_height(self, width: float, solid: float) -> float:
-        """Height [m] to be filled by grains of the area `solid` [m^2] in a container of this width [m]."""
+    def region_height(self, width: float, solid: float, densest: float = 0.0) -> float:
+        """Height [m] to be filled by grains of the area `solid` [m^2] in a container of this width [m]; densest: void ratio that stands for
+        as dense as it gets."""
         if self.height is not None:
             return self.height
         wanted = USUAL[self.method] if self.void_ratio is None else self.void_ratio
-        return (1.0 + wanted) * solid / width
+        return (1.0 + (wanted or densest)) * solid / width
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:

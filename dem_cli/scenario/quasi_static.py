@@ -16,7 +16,7 @@ from dem_cli.scenario.quasi_static_tables import (
     Solver,
 )
 from dem_cli.scenario.stored_grains import is_result_file
-from dem_cli.scenario.table import Given, Mistake, Table, key
+from dem_cli.scenario.table import Given, Mistake, Table, did_you_mean, key
 
 
 class QuasiStaticScenario(AnyScenario):
@@ -93,7 +93,7 @@ def _branches(stages: Sequence[QuasiStaticStage]) -> Iterator[Mistake]:
             remedy = "Give each of them a name of its own"
             yield Mistake(("stage", number, "from"), "names several earlier stages", remedy)
             continue
-        remedy = f"Name one of {', '.join(dict.fromkeys(earlier))}, or leave it out" if earlier else "Leave it out"
+        remedy = did_you_mean(branch, list(dict.fromkeys(earlier))) if earlier else "Leave it out"
         yield Mistake(("stage", number, "from"), "names no earlier stage", remedy)
 
 
@@ -102,7 +102,8 @@ def unprepared(stages: Sequence[QuasiStaticStage]) -> Iterator[Mistake]:
     prepared: list[bool] = []
     for number, stage in enumerate(stages):
         before = goes_on_from(stages, number)
-        ready = before is not None and prepared[before]
+        astray = stage.branch is not None and before is None  # a mistake of its own
+        ready = astray or (before is not None and prepared[before])
         if isinstance(stage, Shear | Cyclic) and not ready and stage.hold != "lateral-strain":
             rule = "nothing has compressed the sample before: there is no stress to hold"
             if isinstance(stage, Cyclic) or stage.hold == "volume":
