@@ -24,6 +24,9 @@ from dem_cli.jit import kernel
 
 ADVANCE = 0.01  # most that a servo moves a wall in one iteration, as a share of the mean radius
 MOST_SERVOS = 2
+# Entries of the ledger of work [J]: of the boundary, of body forces, of the fixing forces, and what sliding has cost in contacts
+# that are no longer near.
+BOUNDARY, BODY, FIXING, GONE, LEDGER = 0, 1, 2, 3, 4
 
 
 class Chain(NamedTuple):
@@ -187,17 +190,19 @@ def move_box(box, size, servos, step):
 
 @kernel()
 def account(x, before, fixing, old_fixing, bodies, old_load, sums, old_sums, box, old_box, ledger):
-    """Adds the work of one move to ledger (3,) [J]: of the boundary, of body forces, and of the fixing forces; trapezoids of the forces at both ends."""
+    """Adds the work of one move to the ledger (LEDGER,) [J]: trapezoids of the forces at both ends."""
     for i in range(x.shape[0]):
         dx, dy = x[i, 0] - before[i, 0], x[i, 1] - before[i, 1]
         wx, wy = 0.5 * (fixing[i, 0] + old_fixing[i, 0]) * dx, 0.5 * (fixing[i, 1] + old_fixing[i, 1]) * dy
         kind = bodies.kind[i]
-        ledger[0 if kind == DRIVEN else 2] += wx
-        ledger[0 if kind in (DRIVEN, TIED) else 2] += wy
+        ledger[BOUNDARY if kind == DRIVEN else FIXING] += wx
+        ledger[BOUNDARY if kind in (DRIVEN, TIED) else FIXING] += wy
         if kind not in (MEMBRANE, TIED, DRIVEN):
-            ledger[2] += 0.5 * (fixing[i, 2] + old_fixing[i, 2]) * (x[i, 2] - before[i, 2])
-            ledger[1] += bodies.load[i, 0] * dx + bodies.load[i, 1] * dy
+            ledger[FIXING] += 0.5 * (fixing[i, 2] + old_fixing[i, 2]) * (x[i, 2] - before[i, 2])
+            ledger[BODY] += bodies.load[i, 0] * dx + bodies.load[i, 1] * dy
         else:
-            ledger[0] += 0.5 * ((bodies.load[i, 0] + old_load[i, 0]) * dx + (bodies.load[i, 1] + old_load[i, 1]) * dy)
-    ledger[0] -= 0.5 * (sums[WALL_X] + old_sums[WALL_X]) * (box[2] - old_box[2])
-    ledger[0] -= 0.5 * (sums[WALL_Y] + old_sums[WALL_Y]) * (box[3] - old_box[3])
+            ledger[BOUNDARY] += 0.5 * (
+                (bodies.load[i, 0] + old_load[i, 0]) * dx + (bodies.load[i, 1] + old_load[i, 1]) * dy
+            )
+    ledger[BOUNDARY] -= 0.5 * (sums[WALL_X] + old_sums[WALL_X]) * (box[2] - old_box[2])
+    ledger[BOUNDARY] -= 0.5 * (sums[WALL_Y] + old_sums[WALL_Y]) * (box[3] - old_box[3])

@@ -59,7 +59,7 @@ def build_sample(scenario: QuasiStaticScenario, assembly: Assembly) -> Sample:
 
 
 def ring_around(box: Floats, radius: float) -> tuple[Floats, Ints]:
-    """Centres (m, 2) [m] of grains outside the box that touch it from outside and each other (or overlap a little), anticlockwise; all one string."""
+    """Centres (m, 2) [m] of grains that touch the box from outside and each other, or overlap a little, anticlockwise; all one string."""
     half = box[2:] + radius
     corners = box[:2] + half * np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
     sides = []
@@ -71,7 +71,7 @@ def ring_around(box: Floats, radius: float) -> tuple[Floats, Ints]:
 
 
 def membranes(box: Floats, radius: float) -> tuple[Floats, Ints]:
-    """Centres (m, 2) [m] and strings: 0 the right membrane from the bottom up, 1 the left one from the top down; between walls at bottom and top."""
+    """Centres (m, 2) [m] and strings: 0 the right membrane from the bottom up, 1 the left one from the top down, between the walls."""
     reach = float(box[3]) - radius
     count = max(math.ceil(reach / radius * (1.0 - 1e-9)) + 1, 3)
     up = box[1] + np.linspace(-reach, reach, count)

@@ -1,7 +1,7 @@
 """Contacts of the granular element method: forces, contact stiffness and what sliding dissipates (Kishino 1988, section 2).
 
-Bodies are discs; x (n, 3) holds their centre and r times their turn [m], so that all three have one unit. Grains come first, boundary grains (chains,
-membranes) last. The fixing force F (n, 3) [N] of a disc is what would hold it at rest: F = sum T' P - B (5), its third part the moment over r.
+Bodies are discs; x (n, 3) holds their centre and r times their turn [m], so that all three have one unit. Grains come first, boundary
+grains (chains, membranes) last. The fixing force F (n, 3) [N] of a disc is what would hold it at rest: F = sum T' P - B (5), its third part the moment over r.
 Four walls stand around a fixed centre; `box` is (centre x, centre y, half width, half height) [m].
 """
 
@@ -49,8 +49,8 @@ class Law(NamedTuple):
 class Near(NamedTuple):
     """Contacts that may come to touch while no disc moves more than half a skin, and their forces at the last look.
 
-    start, neighbour: half list; first, second (m,): the same as pairs; memory (m, COLUMNS); normal, shear [N], slip [m] (m,): slip is what
-    the slider has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made.
+    start, neighbour: half list; first, second (m,): the same as pairs; memory (m, COLUMNS); normal, shear [N], slip [m] (m,): what the
+    slider has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made.
     """
 
     start: np.ndarray
@@ -121,10 +121,10 @@ def renew(x, bodies, law, box, skin, old):
     for i in range(n):
         for w in range(4):
             nx, ny, place = wall_of(w, box)
-            if law.wall[w] and bodies.kind[i] == GRAIN:
-                if nx * x[i, 0] + ny * x[i, 1] + bodies.radius[i] > place - skin:
-                    disc.append(np.int32(i))
-                    side.append(np.int32(w))
+            near_wall = nx * x[i, 0] + ny * x[i, 1] + bodies.radius[i] > place - skin
+            if near_wall and law.wall[w] and bodies.kind[i] == GRAIN:
+                disc.append(np.int32(i))
+                side.append(np.int32(w))
     k = len(disc)
     discs, sides, memory = np.empty(k, np.int32), np.empty(k, np.int32), np.zeros((k, COLUMNS + 1))
     seen = 0
@@ -158,8 +158,8 @@ def is_stale(x, box, near, skin):
 def forces(x, anchor, near, bodies, law, box, fixing, count, sums):
     """Fixing forces of all discs at x; the slider returns to its limit from the anchor.
 
-    The normal force is kn times the overlap, a state; the tangential one starts from the memory and takes kt times the relative displacement since
-    the anchor (n, 3), along the tangent in the middle of the way. fixing (n, 3) [N], count (n,): contacts, sums (SUMS,): changed in place,
+    The normal force is kn times the overlap, a state; the tangential one starts from the memory and takes kt times the relative displacement
+    since the anchor (n, 3), along the tangent in the middle of the way. fixing (n, 3) [N], count (n,): contacts, sums (SUMS,): changed in place,
     as are the forces in `near`.
     """
     n = bodies.radius.size
@@ -253,7 +253,7 @@ def _add(stiffness, i, nx, ny, kn, kt):
 
 
 @kernel()
-def contact_stiffness(x, near, bodies, law, box, stiffness, last):
+def contact_stiffness(x, near, law, box, stiffness, last):
     """Contact stiffness S (8) of each disc, shape (n, 6) as xx, xy, xq, yy, yq, qq, with kt also where contacts slide.
 
     last (n, 2): normal of the last contact of each disc, towards the other body. Both are overwritten.
@@ -301,6 +301,12 @@ def lose(near):
     for c in range(near.disc.size):
         if near.wall_slip[c] != 0.0 and near.wall_memory[c, NORMAL] > 0.0:
             near.wall_memory[c, LOST] += 0.5 * (near.wall_memory[c, SHEAR] + near.wall_shear[c]) * near.wall_slip[c]
+
+
+@kernel()
+def lost_so_far(near):
+    """Sum of LOST [J]."""
+    return near.memory[:, LOST].sum() + near.wall_memory[:, LOST].sum()
 
 
 @kernel()

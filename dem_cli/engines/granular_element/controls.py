@@ -33,7 +33,10 @@ def hold_stress(sample: Sample, target: dict[int, float], scale: float) -> Servo
 
 @dataclass(frozen=True)
 class ShearControl:
-    """Shear strain e1 - e2 that grows under what is held. axial: direction of e1, 0 is x, 1 is y; stress (2,) [Pa]: at the start; volume: product of the half sizes over that of `size`."""
+    """Shear strain e1 - e2 that grows under what is held.
+
+    axial: direction of e1, 0 is x, 1 is y; stress (2,) [Pa]: at the start; volume: product of the half sizes over that of `size`.
+    """
 
     axial: int
     hold: str
@@ -82,7 +85,7 @@ class ShearControl:
 
 @dataclass(frozen=True)
 class LoadControl:
-    """Stress or strain of each direction on a straight way from the start; stress, strain (2,): at the start, None where it is not what is prescribed."""
+    """Each direction on a straight way: stress [Pa] or half size [m] at start and end, None where it is not what is prescribed."""
 
     stress: tuple[tuple[float, float] | None, ...]
     half: tuple[tuple[float, float] | None, ...]

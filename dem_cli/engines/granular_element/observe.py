@@ -46,7 +46,6 @@ def walls_of(sample: Sample) -> Walls:
 
 def slips_of(done: Done) -> Slips:
     """What each contact has dissipated in the sub-steps of an increment."""
-    key = np.column_stack([done.first, done.second])
-    pairs, where = np.unique(key, axis=0, return_inverse=True)
-    energy = np.bincount(where.ravel(), weights=done.lost, minlength=len(pairs))
+    pairs, where = np.unique(np.column_stack([done.first, done.second]), axis=0, return_inverse=True)
+    energy = np.bincount(where.ravel(), weights=done.lost, minlength=len(pairs)).astype(np.float64)
     return Slips(pairs[:, 0], pairs[:, 1], energy)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.granular_element.boundary import (
+    GONE,
     MOST_SERVOS,
     account,
     area_inside,
@@ -30,6 +31,7 @@ from dem_cli.engines.granular_element.contacts import (
     forces,
     is_stale,
     lose,
+    lost_so_far,
     renew,
     set_anchor,
 )
@@ -71,7 +73,7 @@ class Iterates(NamedTuple):
     old_fixing: np.ndarray
     inverse: np.ndarray
     last: np.ndarray
-    count: np.ndarray
+    touching: np.ndarray
     old_load: np.ndarray
 
 
@@ -85,7 +87,7 @@ def room_for(n):
 @kernel()
 def look(x, anchor, near, bodies, law, chain, box, depth, room, sums):
     """Fixing forces at x, membranes included; returns the energy of the membranes' links [J]."""
-    forces(x, anchor, near, bodies, law, box, room.fixing, room.count, sums)
+    forces(x, anchor, near, bodies, law, box, room.fixing, room.touching, sums)
     return membrane_forces(x, bodies, chain, depth, room.fixing) if chain.ring.size > 0 else 0.0
 
 
@@ -113,13 +115,13 @@ def _invert(block, add, turns, out):
 def _blocks(x, near, bodies, law, chain, box, room, momentum):
     """Inverse blocks of all discs; those that cannot be inverted (12) are zero."""
     blocks = np.empty((x.shape[0], 6))
-    contact_stiffness(x, near, bodies, law, box, blocks, room.last)
+    contact_stiffness(x, near, law, box, blocks, room.last)
     if chain.ring.size > 0:
         membrane_stiffness(x, bodies, chain, blocks)
     for i in range(x.shape[0]):
         add = 0.0
         if momentum:
-            add = law.kn * (FIRM if room.count[i] > 1 or bodies.kind[i] != GRAIN else LOOSE)
+            add = law.kn * (FIRM if room.touching[i] > 1 or bodies.kind[i] != GRAIN else LOOSE)
         _invert(blocks[i], add, bodies.kind[i] == GRAIN, room.inverse[i])
 
 
@@ -148,7 +150,7 @@ def _move(x, bodies, law, room, pace, momentum):
         kind = bodies.kind[i]
         if kind == DRIVEN:
             continue
-        keep, count = momentum, room.count[i]
+        keep, count = momentum, room.touching[i]
         loaded = kind == GRAIN and (bodies.load[i, 0] != 0.0 or bodies.load[i, 1] != 0.0)
         if kind == GRAIN and count == 0:
             dx, dy, dq = pace.beta * bodies.load[i, 0] / law.kn, pace.beta * bodies.load[i, 1] / law.kn, 0.0
@@ -194,7 +196,7 @@ def _moved(x, anchor, bodies, room):
     """Farthest way from the anchor of a grain that is held by two contacts and more [m]."""
     most = 0.0
     for i in range(bodies.grains):
-        if room.count[i] > 1:
+        if room.touching[i] > 1:
             most = max(most, (x[i, 0] - anchor[i, 0]) ** 2 + (x[i, 1] - anchor[i, 1]) ** 2)
     return math.sqrt(most)
 
@@ -217,7 +219,7 @@ def _strain(x, box, goal, guess, bodies, chain, affine):
 def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, depth, skin, pace, ledger):
     """Strains the sample to half sizes goal (2,) [m], then iterates to equilibrium. guess (n, 3) [m]: how discs will move; (0, 3) for no guess.
 
-    x, anchor (n, 3), box (4,), the memory of `near` (LOST, and with `follow` the anchor) and ledger (3,) [J] change in place;
+    x, anchor (n, 3), box (4,), the memory of `near` (LOST, and with `follow` the anchor) and ledger (LEDGER,) [J] change in place;
     size (2,) [m]: half sizes that strains count against. Returns (near, status, iterations, largest fixing force [N], disc, error of stress).
     """
     n = x.shape[0]
@@ -230,7 +232,9 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
         if iteration == 0:
             _strain(x, box, goal, guess, bodies, chain, pace.momentum)
         if is_stale(x, box, near, skin):
+            had = lost_so_far(near)
             near = renew(x, bodies, law, box, skin, near)
+            ledger[GONE] += had - lost_so_far(near)
             since = REFRESH
         look(x, anchor, near, bodies, law, chain, box, depth, room, sums)
         if pace.follow:

@@ -31,7 +31,9 @@ SKIN = 0.15  # of the mean radius
 
 @dataclass(frozen=True)
 class View:
-    """Forces of a sample where it is: iterates (fixing forces, contacts a disc), sums over the boundary, energy of springs [J]: normal, tangential, links."""
+    """Forces of a sample where it is: fixing forces and contacts of each disc, sums over the boundary, energy of springs [J]: normal, tangential,
+    links.
+    """
 
     room: Iterates
     sums: Floats

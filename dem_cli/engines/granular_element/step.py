@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dem_cli.engines.granular_element.boundary import Servos, account
+from dem_cli.engines.granular_element.boundary import BODY, BOUNDARY, FIXING, GONE, LEDGER, Servos, account
 from dem_cli.engines.granular_element.contacts import LOST, lose, lose_in_step
 from dem_cli.engines.granular_element.relax import AWAY, BALANCED, NOT_A_NUMBER, Pace, relax
 from dem_cli.engines.granular_element.sample import Sample, View, no_servos
@@ -19,7 +19,6 @@ AMISS = 0.05  # as has a sub-step whose ledger misses this share of its usual wo
 HALF = 0.5  # of the block move: more locks contacts in a cycle of opening and closing
 QUIET = 10_000  # iterations, and four a disc, until a sub-step counts as a collapse
 NO_GUESS = np.empty((0, 3))
-BOUNDARY, BODY, FIXING = 0, 1, 2  # entries of the ledger
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,7 @@ def quiet_step(
     start = before.look()
     affine = float(np.abs(goal - sample.box[2:]).max())
     far = max(FAR * affine, NEAR_BY * float(sample.bodies.radius.mean()))
-    if not _iterate(sample, goal, servos, solver.quiet(len(sample.x), far), done, np.zeros(3), guess):
+    if not _iterate(sample, goal, servos, solver.quiet(len(sample.x), far), done, np.zeros(LEDGER), guess):
         return None
     end = sample.look()
     lose(sample.near)
@@ -148,7 +147,7 @@ def collapse_step(
     sample: Sample, goal: Floats, servos: Servos, solver: Solver, paces: list[Pace] | None = None
 ) -> Done:
     """A sub-step whose path is followed iterate by iterate; what the fixing forces take out is energy released."""
-    done, before, ledger = Done(), sample.copy(), np.zeros(3)
+    done, before, ledger = Done(), sample.copy(), np.zeros(LEDGER)
     start = before.look()
     done.balanced = _iterate(sample, goal, servos, paces or solver.collapse(len(sample.x)), done, ledger)
     _settle_up(before, sample, start, sample.look(), done, follow=ledger)
@@ -173,7 +172,7 @@ class Way:
         """Moves for a sub-step to `goal`: those of the last one; of discs that nothing holds, the affine ones."""
         affine = np.zeros_like(self.moves)
         affine[:, :2] = (sample.x[:, :2] - sample.box[:2]) * (goal / sample.box[2:] - 1.0)
-        return np.where((before.room.count > 1)[:, None], self.moves, affine)
+        return np.where((before.room.touching > 1)[:, None], self.moves, affine)
 
 
 def sub_step(
@@ -205,9 +204,9 @@ def _kishino_step(sample: Sample, before: Sample, goal: Floats, servos: Servos, 
     """The paper's step: the strain, equilibrium under it, then the stresses (section 2 (6)). Its ledger is that of (25)-(29)."""
     done, start = Done(), before.look()
     paces = [solver.pace(len(sample.x), solver.alpha, 0.0, solver.most, follow=True)]
-    done.balanced = _iterate(sample, goal, no_servos(), paces, done, np.zeros(3))
+    done.balanced = _iterate(sample, goal, no_servos(), paces, done, np.zeros(LEDGER))
     if servos.number:
-        done.balanced = _iterate(sample, sample.box[2:].copy(), servos, paces, done, np.zeros(3))
+        done.balanced = _iterate(sample, sample.box[2:].copy(), servos, paces, done, np.zeros(LEDGER))
     end = sample.look()
     lose_in_step(sample.x, before.x, sample.near, sample.law)
     _settle_up(before, sample, start, end, done, follow=None)
@@ -216,7 +215,7 @@ def _kishino_step(sample: Sample, before: Sample, goal: Floats, servos: Servos, 
 
 def _settle_up(before: Sample, sample: Sample, start: View, end: View, done: Done, *, follow: Floats | None) -> None:
     """The energies of a sub-step: work from the forces at both ends, or as it was followed."""
-    ledger = np.zeros(3) if follow is None else follow
+    ledger = np.zeros(LEDGER) if follow is None else follow
     if follow is None:
         account(
             sample.x, before.x, end.room.fixing, start.room.fixing, sample.bodies, before.bodies.load, end.sums, start.sums,
@@ -230,7 +229,7 @@ def _settle_up(before: Sample, sample: Sample, start: View, end: View, done: Don
     some = lost != 0.0
     done.first, done.second, done.lost = first[some], second[some], lost[some]
     done.work, done.body_work = float(ledger[BOUNDARY]), float(ledger[BODY])
-    done.friction = float(lost.sum())
+    done.friction = float(lost.sum() + ledger[GONE])
     done.released = 0.0 if follow is None else -float(ledger[FIXING])
     gained = float((end.energy - start.energy).sum())
     done.residual = done.work + done.body_work - gained - done.friction - done.released
