@@ -1,7 +1,8 @@
 """Contacts of the granular element method: forces, contact stiffness and what sliding dissipates (Kishino 1988, section 2).
 
 Bodies are discs; x (n, 3) holds their centre and r times their turn [m], so that all three have one unit. Grains come first, boundary
-grains (chains, membranes) last. The fixing force F (n, 3) [N] of a disc is what would hold it at rest: F = sum T' P - B (5), its third part the moment over r.
+grains (chains, membranes) last. The fixing force F (n, 3) [N] of a disc is what would hold it at rest: F = sum T' P - B (5), its third
+part the moment over r.
 Four walls stand around a fixed centre; `box` is (centre x, centre y, half width, half height) [m].
 """
 
@@ -168,8 +169,10 @@ def forces(x, anchor, near, bodies, law, box, fixing, count, sums):
     sums[:] = 0.0
     sums[GAP_X] = sums[GAP_Y] = np.inf
     for i in range(n):
-        fixing[i, 0], fixing[i, 1], fixing[i, 2] = -bodies.load[i, 0], -bodies.load[i, 1], 0.0
+        fixing[i, 0] = fixing[i, 1] = fixing[i, 2] = 0.0
         count[i] = 0
+    for i in range(bodies.grains):  # the load of membranes comes with their pressure
+        fixing[i, 0], fixing[i, 1] = -bodies.load[i, 0], -bodies.load[i, 1]
     flips = 0
     for c in range(near.first.size):
         i, j = near.first[c], near.second[c]

@@ -45,10 +45,12 @@ REFRESH = 20  # iterations after which blocks are made anew though no contact op
 
 
 class Pace(NamedTuple):
-    """How to iterate. momentum: the momentum iteration, else Kishino's; step: h, or alpha; cap: of the momentum; most: iterations; follow: the slider
-    starts anew from every iterate (as in the paper) and the ledger is kept iterate by iterate; accuracy [N]; stress: error of the servos over
-    their scale; far [m]: way from the anchor at which a grain that is held ends the attempt; patience: iterations in which the error must
-    fall by half, in square, or the momentum's cap is lowered; alpha_prime, beta, beta_prime: (10), (11).
+    """How to iterate.
+
+    momentum: the momentum iteration, else Kishino's; step: h, or alpha; cap: of the momentum; most: iterations; follow: the slider starts
+    anew from every iterate (as in the paper) and the ledger is kept iterate by iterate; accuracy [N]; stress: error of the servos over their
+    scale; far [m]: way from the anchor at which a grain that is held ends the attempt; patience: iterations in which the error must fall by half,
+    in square, or the momentum's cap is lowered; alpha_prime, beta, beta_prime: (10), (11).
     """
 
     momentum: bool
@@ -122,7 +124,11 @@ def _blocks(x, near, bodies, law, chain, box, room, momentum):
         add = 0.0
         if momentum:
             add = law.kn * (FIRM if room.touching[i] > 1 or bodies.kind[i] != GRAIN else LOOSE)
-        _invert(blocks[i], add, bodies.kind[i] == GRAIN, room.inverse[i])
+        if bodies.kind[i] == TIED:
+            room.inverse[i, :] = 0.0
+            room.inverse[i, 0] = 1.0 / (blocks[i, 0] + max(add, FIRM * law.kn))
+        else:
+            _invert(blocks[i], add, bodies.kind[i] == GRAIN, room.inverse[i])
 
 
 @kernel(inline=True)

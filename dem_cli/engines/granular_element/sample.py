@@ -31,9 +31,7 @@ SKIN = 0.15  # of the mean radius
 
 @dataclass(frozen=True)
 class View:
-    """Forces of a sample where it is: fixing forces and contacts of each disc, sums over the boundary, energy of springs [J]: normal, tangential,
-    links.
-    """
+    """Forces of a sample where it is: of each disc, sums over the boundary, and the energy of normal, tangential springs and links [J]."""
 
     room: Iterates
     sums: Floats
