@@ -47,6 +47,10 @@ ONE_LINE: list[tuple[dict[str, Any], str]] = [
     ({"container.lid": True}, "[container] lid = true: " + OF_EXPLICIT),
     ({"integration": {"safety": 0.5}}, "[integration] = { safety = 0.5 }: " + OF_EXPLICIT),
     ({"output.interval": "1 s"}, '[output] interval = "1 s": ' + OF_EXPLICIT),
+    (
+        {"output.frames": "0.1 s"},
+        '[output] frames = "0.1 s": must be a whole number. Write for example 1, a frame each increment',
+    ),
     ({"output.window": {"side": 0.1}}, "[output] window = { side = 0.1 }: " + OF_EXPLICIT),
     (
         {"stage.1": {"kind": "shake"}},

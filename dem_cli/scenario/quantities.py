@@ -127,9 +127,11 @@ class Number(Range):
 class Whole(Number):
     """Annotation of a whole number."""
 
+    example: str = "3000"
+
     def validate(self, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
-            advice = _plainly(value, "3000")
+            advice = _plainly(value, self.example)
             raise mistake("must be a whole number", advice if "." not in advice else "Round it")
         self.check(value)
         return value

@@ -183,7 +183,7 @@ class Solver(Table):
 class QuasiStaticOutput(Table):
     """What is written. The series has a row for each increment."""
 
-    frames: Annotated[int, Whole(ge=1)] = key(
+    frames: Annotated[int, Whole(ge=1, example="1, a frame each increment")] = key(
         1, "a frame every so many increments: all grains, contacts and forces", example=1
     )
     tracks: Followed | None = key(
