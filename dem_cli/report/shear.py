@@ -120,7 +120,7 @@ def _test(results: Results) -> Test:
         seed=int(attrs.get("seed", 0)),
         grains=results.grain_count,
         boundary=str(scenario.get("boundary", {}).get("kind", "walls")),
-        boundary_elements=int(attrs.get("boundary", 0)),
+        boundary_elements=results.boundary,
         depth=results.depth,
         complete=results.complete,
         stop_reason=results.stop_reason,

@@ -83,7 +83,16 @@ def mark_events(ax: Axes, x: Floats, rows: Rows) -> None:
     events = rows["event"] > 0
     if events.any():
         where = ax.get_xaxis_transform()
-        ax.plot(x[events], np.full(np.count_nonzero(events), 0.02), "|", color=EVENT, ms=7, mew=1.2, transform=where, label="_events")
+        ax.plot(
+            x[events],
+            np.full(np.count_nonzero(events), 0.02),
+            "|",
+            color=EVENT,
+            ms=7,
+            mew=1.2,
+            transform=where,
+            label="_events",
+        )
 
 
 # ---------------------------------------------------------------------------------------------- panels
@@ -96,7 +105,7 @@ def panel_ratio(ax: Axes, some: Sequence[Curve]) -> None:
         ax.plot(one.strain, y, color=one.colour, label=one.label)
         mark_peak(ax, one.strain, y, one.peak)
     ax.set(xlabel=STRAIN, ylabel="stress ratio s1/s2")
-    right = ax.secondary_yaxis("right", functions=(_sine, _ratio))
+    right = ax.secondary_yaxis("right", functions=(_sine, _ratio))  # type: ignore[arg-type]
     right.set_ylabel("(s1 - s2)/(s1 + s2)")
     ax.spines["right"].set_visible(True)
 
@@ -116,7 +125,7 @@ def panel_volume(ax: Axes, some: Sequence[Curve]) -> None:
         mark_peak(ax, one.strain, y, one.peak)
         mark_events(ax, one.strain, one.rows)
     ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
-    ax.set(xlabel=STRAIN, ylabel="volumetric strain [%]\ndilation < 0 < contraction")
+    ax.set(xlabel=STRAIN, ylabel="volumetric strain e_v [%]")
 
 
 def panel_deviator(ax: Axes, some: Sequence[Curve]) -> None:
@@ -172,7 +181,11 @@ def panel_energy(ax: Axes, one: Curve) -> None:
 
 
 def _principal(ax: Axes, one: Curve, values: tuple[Floats, Floats], letter: str) -> None:
-    found = ((f"{letter}1 + {letter}2", values[0] + values[1], "black"), (f"{letter}1", values[0], COLORS[1]), (f"{letter}2", values[1], COLORS[0]))
+    found = (
+        (f"{letter}1 + {letter}2", values[0] + values[1], "black"),
+        (f"{letter}1", values[0], COLORS[1]),
+        (f"{letter}2", values[1], COLORS[0]),
+    )
     for label, y, colour in found:
         ax.plot(one.along, y, color=colour, label=label)
         mark_peak(ax, one.along, y, one.peak)
@@ -183,7 +196,11 @@ def _principal(ax: Axes, one: Curve, values: tuple[Floats, Floats], letter: str)
 def panel_dissipation(ax: Axes, one: Curve, depth: float) -> None:
     """Work, dissipation and elastic energy since the stage began over the sample's volume, as in figure 15; what collapses released."""
     found = densities(one.rows, depth)
-    lines = [("work W", "work", "black", "-"), ("friction D", "friction", COLORS[1], "-"), ("elastic", "elastic", COLORS[0], "-")]
+    lines = [
+        ("work W", "work", "black", "-"),
+        ("friction D", "friction", COLORS[1], "-"),
+        ("elastic", "elastic", COLORS[0], "-"),
+    ]
     if np.abs(found["released"]).max() > 1e-3 * max(np.abs(found["work"]).max(), 1e-300):
         lines.append(("released", "released", COLORS[2], (0, (4, 2))))  # type: ignore[arg-type]
     for label, name, colour, dash in lines:
@@ -224,6 +241,7 @@ def _thin(one: Curve) -> float:
 
 
 # ---------------------------------------------------------------------------------------------- figures
+
 
 def stress_panels(some: Sequence[Curve]) -> list[str]:
     """Which panels tell of stress and strain in these curves."""

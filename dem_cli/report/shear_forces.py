@@ -9,9 +9,10 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure, stage_label
+from dem_cli.report.moments import BOUNDARY, frame_box, frames_of_stage
 from dem_cli.report.shear_rows import one_shear_stage, row_of_peak, stage_rows
-from dem_cli.results import Results, StoredFrame
-from dem_cli.state import Contacts, Floats
+from dem_cli.results import Results, StoredIncrement
+from dem_cli.state import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 SECTORS = 36  # of the whole circle, the first one about +x: walls face the middle of a sector
 FORCE = "#B2182B"
-GRAIN, BOUNDARY = "#F4F1EA", "#B9C7D6"
+GRAIN = "#F4F1EA"
 WIDEST = 0.9  # width of the largest force over the mean radius
 
 
@@ -30,13 +31,13 @@ class Moment:
 
     index: int
     name: str
-    frame: StoredFrame
+    frame: StoredIncrement
     text: str
 
 
 def moment(results: Results, index: int, name: str = "") -> Moment:
     """Frame `index`, described by the increment of its stage."""
-    frame = results.frame(index)
+    frame = results.increment(index)
     number = round(float(results.frame_times[index]))
     text = f"{name + ', ' if name else ''}increment {number}"
     row = np.flatnonzero(np.asarray(results.series["increment"]) == number)
@@ -52,8 +53,6 @@ def start_and_peak(results: Results, number: int | None) -> list[Moment]:
     stage = one_shear_stage(results, number)
     rows = stage_rows(results, stage)
     inside = frames_of_stage(results, stage)
-    if len(inside) == 0:
-        raise ScenarioError(f"{results.path}: holds no frame of stage {stage}; write [output] frames more often")
     at = np.asarray(results.frame_times)[inside]
     peak = row_of_peak(rows)
     last = len(rows["increment"]) - 1
@@ -68,14 +67,6 @@ def start_and_peak(results: Results, number: int | None) -> list[Moment]:
     return found
 
 
-def frames_of_stage(results: Results, number: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
-    """Indices of the frames of stage `number`, with that of the state it starts from."""
-    stage = results.stages[number - 1]
-    at = np.asarray(results.frame_times)
-    stop = stage.end if np.isfinite(stage.end) else np.inf
-    return np.flatnonzero((at >= stage.start - 0.5) & (at <= stop + 0.5))
-
-
 def stage_text(results: Results, number: int | None) -> str:
     found = one_shear_stage(results, number)
     return stage_label(found, results.stages[found - 1])
@@ -86,13 +77,13 @@ def stage_text(results: Results, number: int | None) -> str:
 
 def draw_forces(results: Results, moments: list[Moment], text: str) -> Figure:
     """Contact forces of one frame, or of several side by side on one scale."""
-    views = [view(one.frame) for one in moments]
+    views = [frame_box(one.frame) for one in moments]
     wide, high = max(v[1] - v[0] for v in views), max(v[3] - v[2] for v in views)
     size = 4.4 if len(moments) > 1 else 6.0
     figure = new_figure(size * len(moments), min(size * high / wide, 9.0) + 1.1)
     axes = np.atleast_1d(figure.subplots(1, len(moments)))
     largest = largest_force([one.frame for one in moments])
-    boundary = int(results.attrs.get("boundary", 0))
+    boundary = results.boundary
     for ax, one in zip(axes, moments, strict=True):
         panel_forces(ax, one.frame, largest, boundary, (wide, high))
         ax.set_title(one.text)
@@ -107,24 +98,14 @@ def force_note(largest: float, boundary: int) -> str:
     return note + ("; blue grey: boundary grains" if boundary else "")
 
 
-def largest_force(frames: list[StoredFrame]) -> float:
+def largest_force(frames: list[StoredIncrement]) -> float:
     """Largest contact force of all frames [N], 0 without contacts."""
-    return max((float(np.hypot(c.normal, c.shear).max(initial=0.0)) for c in map(_contacts, frames)), default=0.0)
+    return max(
+        (float(np.hypot(c.normal, c.shear).max(initial=0.0)) for c in (frame.contacts for frame in frames)), default=0.0
+    )
 
 
-def view(frame: StoredFrame) -> tuple[float, float, float, float]:
-    """x0, x1, y0, y1 [m]: grains and walls that have ends."""
-    g, w = frame.grains, frame.walls
-    found = []
-    for place, ends in ((g.x, (w.x0, w.x1)), (g.y, (w.y0, w.y1))):
-        wall = np.concatenate(ends)
-        wall = wall[np.isfinite(wall)]
-        found += [min(float((place - g.radius).min()), float(wall.min(initial=np.inf)))]
-        found += [max(float((place + g.radius).max()), float(wall.max(initial=-np.inf)))]
-    return found[0], found[1], found[2], found[3]
-
-
-def panel_forces(ax: Axes, frame: StoredFrame, largest: float, boundary: int, size: tuple[float, float]) -> None:
+def panel_forces(ax: Axes, frame: StoredIncrement, largest: float, boundary: int, size: tuple[float, float]) -> None:
     """Grains as outlines, walls, and a slender rectangle through each contact point along its force.
 
     size: width and height [m] of the view, about the middle of the sample. boundary: boundary elements at the end of the grains.
@@ -132,7 +113,7 @@ def panel_forces(ax: Axes, frame: StoredFrame, largest: float, boundary: int, si
     from matplotlib.collections import EllipseCollection, PolyCollection
 
     g = frame.grains
-    x0, x1, y0, y1 = view(frame)
+    x0, x1, y0, y1 = frame_box(frame)
     factor, unit = display_unit("m", max(size))
     ax.set_aspect("equal")
     for middle, length, limit in ((0.5 * (x0 + x1), size[0], ax.set_xlim), (0.5 * (y0 + y1), size[1], ax.set_ylim)):
@@ -152,15 +133,17 @@ def panel_forces(ax: Axes, frame: StoredFrame, largest: float, boundary: int, si
     for k in range(len(w)):
         ax.plot([w.x0[k] / factor, w.x1[k] / factor], [w.y0[k] / factor, w.y1[k] / factor], color="black", lw=1.5)
     corners = rectangles(frame, largest)
-    ax.add_collection(PolyCollection(list(corners / factor), facecolors=FORCE, edgecolors="none", label="forces", zorder=3))
+    ax.add_collection(
+        PolyCollection(list(corners / factor), facecolors=FORCE, edgecolors="none", label="forces", zorder=3)
+    )
 
 
-def rectangles(frame: StoredFrame, largest: float) -> Floats:
+def rectangles(frame: StoredIncrement, largest: float) -> Floats:
     """Corners (c, 4, 2) [m] of a rectangle a contact: along its force, through the contact point, as long as both radii together.
 
     The largest force is WIDEST times the mean radius wide. Towards a wall a rectangle ends at the wall.
     """
-    c, g = _contacts(frame), frame.grains
+    c, g = frame.contacts, frame.grains
     force = np.stack([c.normal * c.nx - c.shear * c.ny, c.normal * c.ny + c.shear * c.nx], axis=1)
     size = np.hypot(force[:, 0], force[:, 1])
     along = force / np.where(size > 0.0, size, 1.0)[:, None]
@@ -172,22 +155,15 @@ def rectangles(frame: StoredFrame, largest: float) -> Floats:
     return np.stack([back - across, front - across, front + across, back + across], axis=1)
 
 
-def _contacts(frame: StoredFrame) -> Contacts:
-    if frame.contacts is not None:
-        return frame.contacts
-    none, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
-    return Contacts(whole, whole, *[none] * 8, none.astype(bool))
-
-
 # ---------------------------------------------------------------------------------------------- roses
 
 
-def rose(frame: StoredFrame, *, energy: bool = False) -> Floats:
+def rose(frame: StoredIncrement, *, energy: bool = False) -> Floats:
     """Percent of the contacts (of their elastic energy, Kishino (22)) in each of SECTORS directions, both ways; together 100.
 
     A contact with a wall counts half (figure 11). Zeros without contacts.
     """
-    c = _contacts(frame)
+    c = frame.contacts
     weight = np.where(c.j < 0, 0.5, 1.0)
     if energy:
         weight = weight * 0.5 * (c.normal * c.overlap + np.abs(c.shear * c.stretch))
@@ -199,9 +175,9 @@ def rose(frame: StoredFrame, *, energy: bool = False) -> Floats:
     return np.asarray(100.0 * share / total if total > 0.0 else share)
 
 
-def within_45(frame: StoredFrame, axial: int, *, energy: bool = False) -> float:
+def within_45(frame: StoredIncrement, axial: int, *, energy: bool = False) -> float:
     """Percent of the rose within 45 deg of the axial direction; what faces 45 deg itself counts half."""
-    c = _contacts(frame)
+    c = frame.contacts
     weight = np.where(c.j < 0, 0.5, 1.0)
     if energy:
         weight = weight * 0.5 * (c.normal * c.overlap + np.abs(c.shear * c.stretch))
@@ -210,21 +186,28 @@ def within_45(frame: StoredFrame, axial: int, *, energy: bool = False) -> float:
     return 100.0 * float(np.sum(weight * (0.5 + 0.5 * np.sign(lead)))) / total if total > 0.0 else float("nan")
 
 
-def panel_rose(ax: PolarAxes, values: Floats, top: float, before: Floats | None = None) -> None:
-    """Bars of `values`; the outline of `before` over them."""
+def within_text(frame: StoredIncrement, axial: int, *, energy: bool) -> str:
+    return f"{within_45(frame, axial, energy=energy):.0f} % within 45° of {'xy'[axial]}"
+
+
+def panel_rose(ax: PolarAxes, values: Floats, top: float, before: Floats | None = None, *, small: bool = False) -> None:
+    """Bars of `values`; the outline of `before` over them. small: no room for angles."""
     width = 2.0 * np.pi / SECTORS
     middle = np.arange(SECTORS) * width
     ax.bar(middle, values, width=width, color=COLORS[4], edgecolor="white", linewidth=0.4)
     if before is not None:
         edges = np.repeat(np.arange(SECTORS + 1) - 0.5, 2)[1:-1] * width
         steps = np.repeat(before, 2)
-        ax.plot(np.append(edges, edges[0] + 2.0 * np.pi), np.append(steps, steps[0]), color="black", lw=0.7, label="before")
+        ax.plot(
+            np.append(edges, edges[0] + 2.0 * np.pi), np.append(steps, steps[0]), color="black", lw=0.7, label="before"
+        )
     ax.set_ylim(0.0, top)
     step = next((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if top / s <= 4.5), 25.0)
     ticks = np.arange(step, top, step)
-    ax.set_yticks(ticks.tolist(), [f"{tick:g} %" for tick in ticks], fontsize=6.5)
+    ax.set_yticks(ticks.tolist(), [f"{tick:g} %" for tick in ticks], fontsize=5.5 if small else 6.5)
     ax.set_rlabel_position(22.5)
-    ax.set_xticks(np.arange(0.0, 2.0 * np.pi, np.pi / 4.0), ["0°", "45°", "90°", "135°", "180°", "225°", "270°", "315°"], fontsize=7)
+    angles = np.arange(0, 360, 90 if small else 45)
+    ax.set_xticks(np.radians(angles).tolist(), ["" if small else f"{angle}°" for angle in angles], fontsize=7)
     ax.tick_params(axis="x", pad=-1)
 
 
@@ -232,14 +215,16 @@ def draw_roses(results: Results, moments: list[Moment], text: str, *, energy: bo
     """Rose of the contact normals (figure 11), or of the elastic energy in their direction (figure 12), in percent, a panel a frame."""
     found = [rose(one.frame, energy=energy) for one in moments]
     if not any(values.any() for values in found):
-        raise ScenarioError(f"{results.path}: nothing touches in the frames that are asked for; choose another --increment")
+        raise ScenarioError(
+            f"{results.path}: nothing touches in the frames that are asked for; choose another --increment"
+        )
     top = 1.08 * max(float(values.max()) for values in found)
-    figure = new_figure(3.9 * len(moments) if len(moments) > 1 else 4.8, 5.0)
+    figure = new_figure(3.9 * len(moments) if len(moments) > 1 else 4.8, 5.5)
     for k, (one, values) in enumerate(zip(moments, found, strict=True)):
         ax: PolarAxes = figure.add_subplot(1, len(moments), k + 1, projection="polar")  # type: ignore[assignment]
         panel_rose(ax, values, top, found[0] if k else None)
-        share = within_45(one.frame, axial, energy=energy)
-        ax.set_title(f"{one.text}\n{share:.0f} % within 45° of {'xy'[axial]}", pad=14)
+        ax.set_title(one.text, pad=10)
+        ax.set_xlabel(within_text(one.frame, axial, energy=energy), labelpad=8)
     what = "Elastic energy in the direction of contact normals" if energy else "Contact normals"
     heading(figure, results, f"{what}, {text}")
     note = "percent of the whole in sectors of 10°; contacts with walls count half"

@@ -229,7 +229,9 @@ def cycles_of(rows: Rows) -> tuple[Cycle, ...]:
     for k in range(0, len(halves), 2):
         pair = halves[k : k + 2]
         first, last = pair[0][0], pair[-1][1]
-        strain, stress, water = (rows[name][first : last + 1] for name in ("shear_strain", "mean_stress", "pore_pressure"))
+        strain, stress, water = (
+            rows[name][first : last + 1] for name in ("shear_strain", "mean_stress", "pore_pressure")
+        )
         found.append(
             Cycle(
                 number=k // 2 + 1,

@@ -8,6 +8,7 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.look import COLORS, heading, new_figure
+from dem_cli.report.moments import frame_box
 from dem_cli.report.shear_curves import (
     Curve,
     curve,
@@ -27,8 +28,7 @@ from dem_cli.report.shear_forces import (
     rose,
     stage_text,
     start_and_peak,
-    view,
-    within_45,
+    within_text,
 )
 from dem_cli.report.shear_rows import Rows, one_shear_stage, row_of_peak, row_of_turn
 from dem_cli.results import Results
@@ -39,6 +39,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
+
+
+MOST = 0.99  # of an increment's dissipation
+LEAST = 1e-3  # share below which a contact is left out of the picture
 
 
 def chosen_rows(rows: Rows) -> list[tuple[str, int]]:
@@ -64,15 +68,19 @@ def chosen_rows(rows: Rows) -> list[tuple[str, int]]:
 def shares(results: Results, increment: float) -> Floats:
     """Shares of the contacts that dissipate most in an increment, falling, without those that are nothing; at most RANKS."""
     table = results.dissipation
-    row = np.flatnonzero(np.asarray(table["increment"]) == increment)
-    if len(row) == 0:
+    row = np.zeros(0, dtype=np.int64) if table is None else np.flatnonzero(table.increment == increment)
+    if table is None or len(row) == 0:
         return np.zeros(0)
-    found = np.asarray(table["share"][row[-1]], dtype=float)
-    return found[np.isfinite(found) & (found > 0.0)]
+    found = table.share[row[0]]
+    return np.asarray(found[np.isfinite(found) & (found > 0.0)])
 
 
 def line_of(share: Floats) -> tuple[float, float] | None:
-    """a, b of log N = a + b log P through the points (P_N, N), least squares; None for fewer than three."""
+    """a, b of log N = a + b log P through the points (P_N, N), least squares over the contacts that make MOST of the whole together.
+
+    None for fewer than three.
+    """
+    share = share[: int(np.count_nonzero(np.cumsum(share) < MOST)) + 1]
     if len(share) < 3 or np.ptp(np.log(share)) == 0.0:
         return None
     b, a = np.polyfit(np.log(share), np.log(np.arange(1, len(share) + 1)), 1)
@@ -83,8 +91,24 @@ def panel_ranked(ax: Axes, share: Floats, line: tuple[float, float] | None, titl
     """Number of contacts with at least the share P of an increment's dissipation; the line of the first increment."""
     if line is not None:
         n = np.array([0.7, 1.4 * RANKS])
-        ax.plot(100.0 * np.exp((np.log(n) - line[0]) / line[1]), n, color="0.5", lw=0.9, ls=(0, (4, 2)), label="first increment")
-    ax.plot(100.0 * share, np.arange(1, len(share) + 1), "o", color=COLORS[0], ms=3.2, mec="white", mew=0.3, label="contacts")
+        ax.plot(
+            100.0 * np.exp((np.log(n) - line[0]) / line[1]),
+            n,
+            color="0.5",
+            lw=0.9,
+            ls=(0, (4, 2)),
+            label="first increment",
+        )
+    ax.plot(
+        100.0 * share,
+        np.arange(1, len(share) + 1),
+        "o",
+        color=COLORS[0],
+        ms=3.2,
+        mec="white",
+        mew=0.3,
+        label="contacts",
+    )
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_ylim(0.8, 1.3 * RANKS)
@@ -123,10 +147,9 @@ def draw_ranked(results: Results, number: int | None) -> Figure:
 
 def _ranked(axes: list[Axes], panels: list[tuple[Floats, str]]) -> None:
     line = line_of(panels[0][0])
-    least = min((float(share.min()) for share, _ in panels if len(share)), default=1e-3)
     for ax, (share, title) in zip(axes, panels, strict=False):
         panel_ranked(ax, share, line, title)
-        ax.set_xlim(max(70.0 * least, 1e-3), 130.0)
+        ax.set_xlim(70.0 * LEAST, 140.0)
     for ax in axes[len(panels) :]:
         ax.set_visible(False)
 
@@ -138,7 +161,9 @@ def draw_page(results: Results, number: int | None) -> Figure:
     """All figures of one stage on a page: forces and roses at the start and the peak, curves, ranked dissipation."""
     import matplotlib
 
-    with matplotlib.rc_context({"font.size": 7.0, "axes.titlesize": 7.5, "lines.linewidth": 0.9, "legend.fontsize": 6.5}):
+    with matplotlib.rc_context(
+        {"font.size": 7.0, "axes.titlesize": 7.5, "lines.linewidth": 0.9, "legend.fontsize": 6.5}
+    ):
         return _page(results, number)
 
 
@@ -147,17 +172,17 @@ def _page(results: Results, number: int | None) -> Figure:
     moments = start_and_peak(results, number)
     figure = new_figure(8.27, 11.69)
     rows = figure.add_gridspec(6, 1, height_ratios=[3.3, 1.9, 1.5, 1.5, 1.5, 1.35])
-    boundary = int(results.attrs.get("boundary", 0))
+    boundary = results.boundary
     frames = [m.frame for m in moments]
     largest = largest_force(frames)
-    views = [view(frame) for frame in frames]
+    views = [frame_box(frame) for frame in frames]
     size = (max(v[1] - v[0] for v in views), max(v[3] - v[2] for v in views))
     top = rows[0].subgridspec(1, 2)
     for k, m in enumerate(moments):
         ax = figure.add_subplot(top[k])
         panel_forces(ax, m.frame, largest, boundary, size)
         ax.set_title(f"Contact forces: {m.text}")
-    _page_roses(results, figure, rows[1].subgridspec(1, 4), moments, int(one.rows["axial"][-1]))
+    _page_roses(figure, rows[1].subgridspec(1, 4), moments, int(one.rows["axial"][-1]))
     names = stress_panels([one])
     stress = rows[2].subgridspec(1, min(len(names), 3))
     for k, name in enumerate(names[:3]):
@@ -176,18 +201,21 @@ def _page(results: Results, number: int | None) -> Figure:
             ax.tick_params(labelleft=False)
     axes[0].set_ylabel("contacts with\nshare P or more")
     heading(figure, results, stage_text(results, number))
-    note = force_note(largest, boundary) + "; dots: peak of s1/s2; strokes: collapses\nroses: percent in sectors of 10°, contacts with walls count half"
+    note = (
+        force_note(largest, boundary)
+        + "; dots: peak of s1/s2; strokes: collapses\nroses: percent in sectors of 10°, contacts with walls count half"
+    )
     figure.supxlabel(note, fontsize=6.5)
     return figure
 
 
-def _page_roses(results: Results, figure: Figure, places: Any, moments: list[Moment], axial: int) -> None:
+def _page_roses(figure: Figure, places: Any, moments: list[Moment], axial: int) -> None:
     """Normals and elastic energy, each at the start and at the peak."""
     for k, energy in enumerate((False, True)):
         found = [rose(m.frame, energy=energy) for m in moments]
         top = 1.08 * max(1e-9, *(float(values.max()) for values in found))
         for n, (m, values) in enumerate(zip(moments, found, strict=True)):
-            ax: PolarAxes = figure.add_subplot(places[2 * k + n], projection="polar")
-            panel_rose(ax, values, top, found[0] if n else None)
-            share = within_45(m.frame, axial, energy=energy)
-            ax.set_title(f"{'Energy' if energy else 'Normals'}, {m.name}\n{share:.0f} % within 45° of {'xy'[axial]}", pad=8)
+            ax: PolarAxes = figure.add_subplot(places[2 * k + n], projection="polar")  # type: ignore[assignment]
+            panel_rose(ax, values, top, found[0] if n else None, small=True)
+            ax.set_title(f"{'Energy' if energy else 'Normals'}, {m.name}", pad=5)
+            ax.set_xlabel(within_text(m.frame, axial, energy=energy), labelpad=3)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +25,7 @@ SHEARS = ("shear", "load", "cyclic")  # kinds of stages that shear the sample
 
 def is_quasi_static(results: Results) -> bool:
     """Whether the file counts increments in place of time."""
-    return getattr(results, "axis", "time") == "increment"
+    return results.axis == "increment"
 
 
 def stage_rows(results: Results, number: int) -> Rows:
@@ -121,7 +122,7 @@ def half_cycles(rows: Rows) -> list[tuple[int, int]]:
             ends.append(k)
         last = sign or last
     ends.append(len(way))
-    return [(a, b) for a, b in zip(ends, ends[1:], strict=False) if b > a]
+    return [(a, b) for a, b in pairwise(ends) if b > a]
 
 
 def _or(names: Iterable[str]) -> str:

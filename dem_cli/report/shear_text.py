@@ -195,7 +195,8 @@ def comparison(summaries: Sequence[ShearSummary]) -> Block:
     several = any(len(_sheared(one)) > 1 for one in summaries)
     groups: dict[str, list[tuple[ShearSummary, StageReport | None]]] = {}
     for one in summaries:
-        for stage in _sheared(one) or [None]:
+        found: list[StageReport | None] = [*_sheared(one)]
+        for stage in found or [None]:
             key = json.dumps([one.test.settings, stage.number if stage else 0], sort_keys=True, default=str)
             groups.setdefault(key, []).append((one, stage))
     rows = []
