@@ -16,12 +16,12 @@ from dem_cli.report.look import COLORS, heading, new_figure, stage_label
 from dem_cli.report.shear_rows import (
     Rows,
     densities,
-    half_cycles,
     is_undrained,
     one_shear_stage,
     principal,
-    row_of_peak,
+    reverses,
     shear_stages,
+    shown_peak,
     stage_rows,
 )
 from dem_cli.results import Results
@@ -60,10 +60,8 @@ class Curve:
 def curve(results: Results, number: int, colour: str = COLORS[0]) -> Curve:
     """Stage `number` (from 1)."""
     rows = stage_rows(results, number)
-    reverses = len(half_cycles(rows)) > 1
-    stage = results.stages[number - 1]
-    peak = None if reverses else row_of_peak(rows)
-    return Curve(stage.name or f"stage {number}", rows, colour, peak, reverses, is_undrained(rows))
+    name = results.stages[number - 1].name or f"stage {number}"
+    return Curve(name, rows, colour, shown_peak(rows), reverses(rows), is_undrained(rows))
 
 
 def curves(results: Results, number: int | None) -> list[Curve]:
@@ -176,7 +174,7 @@ def panel_coordination(ax: Axes, one: Curve) -> None:
 def panel_energy(ax: Axes, one: Curve) -> None:
     """Principal values of the tensor of elastic energy, Kishino (24), and their sum, as in figure 14."""
     _principal(ax, one, principal(one.rows, "energy"), "E")
-    ax.set(ylabel="elastic energy [J/m^3]")
+    ax.set(ylabel="elastic energy [J/m³]")
     ax.set_ylim(bottom=0.0)
 
 
@@ -209,7 +207,7 @@ def panel_dissipation(ax: Axes, one: Curve, depth: float) -> None:
             mark_peak(ax, one.along, found[name], one.peak)
     mark_events(ax, one.along, one.rows)
     ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
-    ax.set(xlabel=_label([one]), ylabel="energy since the start [J/m^3]")
+    ax.set(xlabel=_label([one]), ylabel="energy [J/m³]")
     name_lines(ax)
 
 
@@ -221,11 +219,20 @@ def panel_share(ax: Axes, one: Curve) -> None:
         mark_peak(ax, step, share, one.peak - 1)
     mark_events(ax, step, {"event": one.rows["event"][1:]})
     ax.set_ylim(0.0, 100.0)
-    ax.set(xlabel=INCREMENT, ylabel="largest contact's share [%]")
+    ax.set(xlabel=INCREMENT, ylabel="largest share [%]")
 
 
 def name_lines(ax: Axes) -> None:
-    ax.legend(loc="best", fontsize=8, handlelength=1.6, borderaxespad=0.2)
+    """A row of names above the panel, where no curve can run through it."""
+    count = len(ax.get_legend_handles_labels()[1])
+    ax.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=min(count, 4),
+        handlelength=1.6,
+        borderaxespad=0.2,
+        columnspacing=1.2,
+    )
 
 
 def _along(one: Curve, some: Sequence[Curve]) -> Floats:
@@ -310,7 +317,7 @@ def draw_one(results: Results, what: str, number: int | None) -> Figure:
     titles = {
         "coordination": "Coordination tensor",
         "energy-tensor": "Tensor of elastic energy",
-        "dissipation": "Work and dissipation",
+        "dissipation": "Work, dissipation and elastic energy since the start",
         "largest-share": "Share of the contact that dissipates most",
     }
     if what == "coordination":

@@ -10,7 +10,7 @@ import numpy as np
 from dem_cli.errors import ScenarioError
 from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure, stage_label
 from dem_cli.report.moments import BOUNDARY, frame_box, frames_of_stage
-from dem_cli.report.shear_rows import one_shear_stage, row_of_peak, stage_rows
+from dem_cli.report.shear_rows import one_shear_stage, shown_peak, stage_rows
 from dem_cli.results import Results, StoredIncrement
 from dem_cli.state import Floats
 
@@ -54,7 +54,7 @@ def start_and_peak(results: Results, number: int | None) -> list[Moment]:
     rows = stage_rows(results, stage)
     inside = frames_of_stage(results, stage)
     at = np.asarray(results.frame_times)[inside]
-    peak = row_of_peak(rows)
+    peak = shown_peak(rows)
     last = len(rows["increment"]) - 1
     start, top = rows["increment"][0], rows["increment"][last if peak is None else peak]
     if np.isnan(start):
@@ -228,5 +228,5 @@ def draw_roses(results: Results, moments: list[Moment], text: str, *, energy: bo
     what = "Elastic energy in the direction of contact normals" if energy else "Contact normals"
     heading(figure, results, f"{what}, {text}")
     note = "percent of the whole in sectors of 10°; contacts with walls count half"
-    figure.supxlabel(note + ("\nline: the first" if len(moments) > 1 else ""), fontsize=8)
+    figure.supxlabel(note + ("\nline: at the start" if len(moments) > 1 else ""), fontsize=8)
     return figure

@@ -11,7 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from dem_cli.report.shear_rows import Rows, densities, half_cycles, is_undrained, row_of_peak, row_of_turn
+from dem_cli.report.shear_rows import (
+    Rows,
+    densities,
+    half_cycles,
+    is_undrained,
+    row_of_contraction,
+    row_of_peak,
+    row_of_turn,
+)
 
 LIQUEFIED = 0.01  # p'/p0 below which a sample counts as liquefied, where the scenario says nothing
 RESIDUAL_SHARE = 0.2  # of a stage's increments, the last ones, that the residual state is the mean of
@@ -118,12 +126,13 @@ class Undrained:
 
 @dataclass(frozen=True)
 class Shearing:
-    """What a stage of shearing did. turn: None where the volume is held; a turn in row 0 means that the sample dilates from the start,
-    one in the last row (`turn_is_end`) that it contracts throughout. peak: of s1/s2; end: the last row.
+    """What a stage of shearing did. turn: largest contraction up to the peak, in row 0 where the sample dilates from the start, in that of
+    the peak where it contracts up to it; contraction: the largest of the stage; both None where the volume is held. peak: of s1/s2;
+    end: the last row.
     """
 
     turn: Point | None
-    turn_is_end: bool
+    contraction: Point | None
     peak: Point | None
     end: Point
     residual: Residual
@@ -151,12 +160,12 @@ def solver_of(rows: Rows) -> Solver:
 
 def shearing_of(rows: Rows, depth: float, kind: str = "shear", limit: float | None = None) -> Shearing:
     """What a stage of `kind` did; row 0 is the state it starts from. limit: p'/p0 at which a sample counts as liquefied."""
-    turn, peak = row_of_turn(rows), row_of_peak(rows)
+    turn, peak, contraction = row_of_turn(rows), row_of_peak(rows), row_of_contraction(rows)
     last = len(rows["in_stage"]) - 1
     cycles = cycles_of(rows) if kind == "cyclic" else ()
     return Shearing(
         turn=None if turn is None else point(rows, turn),
-        turn_is_end=turn == last,
+        contraction=None if contraction is None else point(rows, contraction),
         peak=None if peak is None else point(rows, peak),
         end=point(rows, last),
         residual=residual_of(rows),

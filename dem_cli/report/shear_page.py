@@ -30,7 +30,7 @@ from dem_cli.report.shear_forces import (
     start_and_peak,
     within_text,
 )
-from dem_cli.report.shear_rows import Rows, one_shear_stage, row_of_peak, row_of_turn
+from dem_cli.report.shear_rows import Rows, one_shear_stage, row_of_turn, shown_peak
 from dem_cli.results import Results
 from dem_cli.results.schema import RANKS
 from dem_cli.state import Floats
@@ -51,7 +51,8 @@ def chosen_rows(rows: Rows) -> list[tuple[str, int]]:
     Without a turn or a peak of its own: evenly spread ones.
     """
     last = len(rows["in_stage"]) - 1
-    peak, turn = row_of_peak(rows), row_of_turn(rows)
+    peak = shown_peak(rows)
+    turn = row_of_turn(rows) if peak is not None else None
     found = {1: "first"}
     if turn is not None and 0 < turn < last:
         found.setdefault(turn, "turn")
@@ -171,7 +172,7 @@ def _page(results: Results, number: int | None) -> Figure:
     one = curve(results, one_shear_stage(results, number))
     moments = start_and_peak(results, number)
     figure = new_figure(8.27, 11.69)
-    rows = figure.add_gridspec(6, 1, height_ratios=[3.3, 1.9, 1.5, 1.5, 1.5, 1.35])
+    rows = figure.add_gridspec(6, 1, height_ratios=[3.0, 1.75, 1.6, 1.65, 1.65, 1.4])
     boundary = results.boundary
     frames = [m.frame for m in moments]
     largest = largest_force(frames)

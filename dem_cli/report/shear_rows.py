@@ -67,14 +67,32 @@ def is_undrained(rows: Rows) -> bool:
     return bool(np.isfinite(rows["pore_pressure"]).any())
 
 
-def row_of_turn(rows: Rows) -> int | None:
-    """Row of the largest contraction; None where the volume is held or not known."""
-    volume = rows["volumetric_strain"]
+def row_of_contraction(rows: Rows, last: int | None = None) -> int | None:
+    """Row of the largest contraction, up to row `last`; None where the volume is held or not known."""
+    volume = rows["volumetric_strain"][: None if last is None else last + 1]
     finite = volume[np.isfinite(volume)]
     # A volume that is held constant wanders by rounding alone.
     if len(finite) < 2 or np.ptp(finite) < 1e-10:
         return None
     return int(np.nanargmax(volume))
+
+
+def row_of_turn(rows: Rows) -> int | None:
+    """Row at which contraction turns to dilation: the largest contraction up to the peak, as collapses after it may contract the sample more.
+
+    Of the whole stage where the shear strain goes to and fro.
+    """
+    return row_of_contraction(rows, None if reverses(rows) else row_of_peak(rows))
+
+
+def reverses(rows: Rows) -> bool:
+    """Whether the shear strain goes to and fro."""
+    return len(half_cycles(rows)) > 1
+
+
+def shown_peak(rows: Rows) -> int | None:
+    """The row that pictures call the peak: none where the shear strain goes to and fro."""
+    return None if reverses(rows) else row_of_peak(rows)
 
 
 def row_of_peak(rows: Rows) -> int | None:

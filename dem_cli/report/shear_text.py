@@ -117,24 +117,31 @@ def _shearing(stage: StageReport, found: Shearing) -> Block:
 
     rows = []
     if found.turn is not None:
-        label = "largest contraction"
+        label = "turn of the volume change"
         if found.turn.in_stage == 0:
-            label += " (it dilates from the start)"
-        elif found.turn_is_end:
-            label += " (it contracts to the end)"
+            label = "dilates from the start"
+        elif found.peak is not None and found.turn.in_stage == found.peak.in_stage:
+            label = "contracts up to the peak"
         rows.append(row(label, found.turn))
     if found.peak is not None:
         rows.append(row("peak of s1/s2", found.peak))
+    if found.contraction is not None and found.contraction != found.turn:
+        rows.append(row("largest contraction", found.contraction))
     rows.append(row("end", found.end))
     r = found.residual
+    if found.cycles:  # a mean over cycles is no state
+        return Block("", _points(stage), tuple(rows))
     rows.append(
         (
             f"residual, mean of the last {r.increments}", "", "", number(100.0 * r.volumetric_strain, "+.4f"),
             number(r.stress_ratio, ".4f"), number(r.sine, ".4f"), number(r.void_ratio, ".4f"),
         )
     )  # fmt: skip
-    header = (f"Stage {stage.number}", "increment", "e1 - e2 [%]", "e_v [%]", "s1/s2", "sine", "void ratio")
-    return Block("", header, tuple(rows))
+    return Block("", _points(stage), tuple(rows))
+
+
+def _points(stage: StageReport) -> tuple[str, ...]:
+    return f"Stage {stage.number}", "increment", "e1 - e2 [%]", "e_v [%]", "s1/s2", "sine", "void ratio"
 
 
 def _energy(stage: StageReport, found: Shearing) -> Block:
@@ -158,7 +165,7 @@ def _energy(stage: StageReport, found: Shearing) -> Block:
         rows.append(("least p'/p0", f"{number(u.ratio_least, '.4f')} in increment {u.at}"))
         when = f", in cycle {u.cycle}" if u.cycle else ""
         rows.append(("liquefied (p'/p0 < " + f"{u.limit:g})", f"YES{when}" if u.liquefied else "no"))
-    return Block("", (f"Stage {stage.number}", "[J/m^3]"), tuple(rows), left=2)
+    return Block("", (f"Stage {stage.number}", "[J/m³]"), tuple(rows), left=2)
 
 
 def _cycles(stage: StageReport, found: Shearing) -> Block:
