@@ -118,7 +118,7 @@ def _test(results: Results) -> Test:
         version=str(attrs.get("program_version", "")),
         scenario_hash=str(attrs.get("scenario_hash", "")),
         seed=int(attrs.get("seed", 0)),
-        grains=results.grain_count,
+        grains=results.grain_count - results.boundary,
         boundary=str(scenario.get("boundary", {}).get("kind", "walls")),
         boundary_elements=results.boundary,
         depth=results.depth,

@@ -7,7 +7,7 @@ loop is drawn over the increments of the stage.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,7 +73,7 @@ def curves(results: Results, number: int | None) -> list[Curve]:
 
 def mark_peak(ax: Axes, x: Floats, y: Floats, peak: int | None) -> None:
     if peak is not None:
-        ax.plot(x[peak], y[peak], "o", color="black", ms=4.5, zorder=5, label="_peak")
+        ax.plot(x[peak], y[peak], "o", color="black", ms=4.5, zorder=5, label="_peak", clip_on=False)
 
 
 def mark_events(ax: Axes, x: Floats, rows: Rows) -> None:
@@ -284,23 +284,43 @@ def draw_panel(ax: Axes, name: str, some: Sequence[Curve]) -> None:
 def draw_stress_strain(results: Results, number: int | None) -> Figure:
     """Stress and volumetric strain over the shear strain; of closed pores the stress path and the pore pressure, too."""
     some = curves(results, number)
+    text = "stages of shearing" if len(some) > 1 else _stage_text(results, number)
+    figure = _stress_figure(some)
+    heading(figure, results, f"Stress and strain, {text}{_peaks(some)}")
+    return figure
+
+
+def draw_compared(several: Sequence[Results], number: int | None) -> Figure:
+    """The same of one stage of each file: stage `number`, or the first that shears the sample."""
+    some = [
+        replace(curve(one, one_shear_stage(one, number), COLORS[k % len(COLORS)]), label=one.path.stem)
+        for k, one in enumerate(several)
+    ]
+    figure = _stress_figure(some)
+    figure.suptitle(f"Stress and strain of {len(some)} tests{_peaks(some)}")
+    return figure
+
+
+def _peaks(some: Sequence[Curve]) -> str:
+    return "; dots: peak of s1/s2" if any(one.peak is not None for one in some) else ""
+
+
+def _stress_figure(some: Sequence[Curve]) -> Figure:
     names = stress_panels(some)
     if len(names) == 2:
         figure = new_figure(5.2, 6.0)
         axes = list(figure.subplots(2, 1, sharex=True))
-        draw_panel(axes[0], names[0], some)
-        draw_panel(axes[1], names[1], some)
-        axes[0].set_xlabel("")
+        axes[0].tick_params(labelbottom=False)
     else:
         figure = new_figure(8.6, 6.4)
         axes = list(figure.subplots(2, 2).ravel())
-        for ax, name in zip(axes, names, strict=True):
-            draw_panel(ax, name, some)
+    for ax, name in zip(axes, names, strict=True):
+        draw_panel(ax, name, some)
+    if len(names) == 2:
+        axes[0].set_xlabel("")
     if len(some) > 1:
-        name_lines(axes[0])
-    text = "stages of shearing" if len(some) > 1 else _stage_text(results, number)
-    peak = "; dots: peak of s1/s2" if any(one.peak is not None for one in some) else ""
-    heading(figure, results, f"Stress and strain, {text}{peak}")
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(len(some), 4))
     return figure
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dem_cli.analysis.quasi_static import SECTORS, contact_energy, contact_rose, energy_rose, force_carrying, halves
 from dem_cli.errors import ScenarioError
 from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure, stage_label
 from dem_cli.report.moments import BOUNDARY, frame_box, frames_of_stage
@@ -19,10 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.projections.polar import PolarAxes
 
-SECTORS = 36  # of the whole circle, the first one about +x: walls face the middle of a sector
 FORCE = "#B2182B"
 GRAIN = "#F4F1EA"
-WIDEST = 0.9  # width of the largest force over the mean radius
+WIDEST = 0.7  # width of the largest force over the mean radius
 
 
 @dataclass(frozen=True)
@@ -158,29 +158,25 @@ def rectangles(frame: StoredIncrement, largest: float) -> Floats:
 # ---------------------------------------------------------------------------------------------- roses
 
 
-def rose(frame: StoredIncrement, *, energy: bool = False) -> Floats:
-    """Percent of the contacts (of their elastic energy, Kishino (22)) in each of SECTORS directions, both ways; together 100.
-
-    A contact with a wall counts half (figure 11). Zeros without contacts.
-    """
+def stiffness_of(frame: StoredIncrement) -> tuple[float, float]:
+    """Stiffness [N/m] of the springs, the same in all contacts, as their forces tell; tangential 0 where no shear force acts."""
     c = frame.contacts
-    weight = np.where(c.j < 0, 0.5, 1.0)
-    if energy:
-        weight = weight * 0.5 * (c.normal * c.overlap + np.abs(c.shear * c.stretch))
-    width = 2.0 * np.pi / SECTORS
-    angle = np.arctan2(c.ny, c.nx)
-    sector = np.floor(np.concatenate([angle, angle + np.pi]) / width + 0.5).astype(np.int64) % SECTORS
-    share = np.bincount(sector, np.concatenate([weight, weight]), minlength=SECTORS)
-    total = float(share.sum())
-    return np.asarray(100.0 * share / total if total > 0.0 else share)
+    normal, shear = c.overlap > 0.0, c.stretch != 0.0
+    kn = float(np.median(c.normal[normal] / c.overlap[normal])) if normal.any() else 0.0
+    return kn, float(np.median(-c.shear[shear] / c.stretch[shear])) if shear.any() else 0.0
+
+
+def rose(frame: StoredIncrement, *, energy: bool = False) -> Floats:
+    """Percent of the contacts, or of their elastic energy, that faces each of SECTORS ways, together 100; NaN without a contact."""
+    return energy_rose(frame, *stiffness_of(frame), SECTORS) if energy else contact_rose(frame, SECTORS)
 
 
 def within_45(frame: StoredIncrement, axial: int, *, energy: bool = False) -> float:
-    """Percent of the rose within 45 deg of the axial direction; what faces 45 deg itself counts half."""
-    c = frame.contacts
-    weight = np.where(c.j < 0, 0.5, 1.0)
+    """Percent of the same within 45 deg of the axial direction; what faces 45 deg itself counts half."""
+    c = force_carrying(frame.contacts)
+    weight = halves(frame, c).astype(float)
     if energy:
-        weight = weight * 0.5 * (c.normal * c.overlap + np.abs(c.shear * c.stretch))
+        weight = weight * contact_energy(c, *stiffness_of(frame))
     lead = np.abs(c.ny) - np.abs(c.nx) if axial == 1 else np.abs(c.nx) - np.abs(c.ny)
     total = float(weight.sum())
     return 100.0 * float(np.sum(weight * (0.5 + 0.5 * np.sign(lead)))) / total if total > 0.0 else float("nan")
@@ -214,11 +210,11 @@ def panel_rose(ax: PolarAxes, values: Floats, top: float, before: Floats | None 
 def draw_roses(results: Results, moments: list[Moment], text: str, *, energy: bool, axial: int) -> Figure:
     """Rose of the contact normals (figure 11), or of the elastic energy in their direction (figure 12), in percent, a panel a frame."""
     found = [rose(one.frame, energy=energy) for one in moments]
-    if not any(values.any() for values in found):
+    if not any(np.isfinite(values).all() for values in found):
         raise ScenarioError(
             f"{results.path}: nothing touches in the frames that are asked for; choose another --increment"
         )
-    top = 1.08 * max(float(values.max()) for values in found)
+    top = 1.08 * max(float(np.nanmax(values, initial=0.0)) for values in found)
     figure = new_figure(3.9 * len(moments) if len(moments) > 1 else 4.8, 5.5)
     for k, (one, values) in enumerate(zip(moments, found, strict=True)):
         ax: PolarAxes = figure.add_subplot(1, len(moments), k + 1, projection="polar")  # type: ignore[assignment]

@@ -214,7 +214,7 @@ def _page_roses(figure: Figure, places: Any, moments: list[Moment], axial: int) 
     """Normals and elastic energy, each at the start and at the peak."""
     for k, energy in enumerate((False, True)):
         found = [rose(m.frame, energy=energy) for m in moments]
-        top = 1.08 * max(1e-9, *(float(values.max()) for values in found))
+        top = 1.08 * max(1e-9, *(float(np.nanmax(values, initial=0.0)) for values in found))
         for n, (m, values) in enumerate(zip(moments, found, strict=True)):
             ax: PolarAxes = figure.add_subplot(places[2 * k + n], projection="polar")  # type: ignore[assignment]
             panel_rose(ax, values, top, found[0] if n else None, small=True)

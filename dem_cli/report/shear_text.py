@@ -197,8 +197,11 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def comparison(summaries: Sequence[ShearSummary]) -> Block:
-    """One row a file (a stage that shears the sample); three or more of equal settings but the seed get a row of their mean."""
+def comparison(summaries: Sequence[ShearSummary], *, each: bool = True) -> Block:
+    """One row a file (a stage that shears the sample); three or more of equal settings but the seed get rows of their mean and median.
+
+    each: False leaves out the rows of the files that are in a mean.
+    """
     several = any(len(_sheared(one)) > 1 for one in summaries)
     groups: dict[str, list[tuple[ShearSummary, StageReport | None]]] = {}
     for one in summaries:
@@ -208,17 +211,23 @@ def comparison(summaries: Sequence[ShearSummary]) -> Block:
             groups.setdefault(key, []).append((one, stage))
     rows = []
     for group in groups.values():
-        values = [_values(one, stage) for one, stage in group]
-        for (one, stage), value in zip(group, values, strict=True):
-            name = Path(one.test.file).name
-            if several and stage is not None:
-                name += f", stage {stage.number} {stage.name or stage.kind}"
-            state = "complete" if one.test.complete else "incomplete"
-            rows.append((name, str(one.test.grains), str(one.test.seed), *_cells(value), state))
-        whole = [v for (one, _), v in zip(group, values, strict=True) if one.test.complete]
-        if len({one.test.seed for one, _ in group if one.test.complete}) >= POOLED:
-            rows += _pooled(np.array(whole), str(group[0][0].test.grains))
+        whole = [(one.test.seed, _values(one, stage)) for one, stage in group if one.test.complete]
+        pooled = len({seed for seed, _ in whole}) >= POOLED
+        for one, stage in group:
+            if each or not pooled or not one.test.complete:
+                rows.append(_row(one, stage, several))
+        if pooled:
+            rows += _pooled(np.array([values for _, values in whole]), str(group[0][0].test.grains))
     return Block("", COLUMNS, tuple(rows))
+
+
+def _row(one: ShearSummary, stage: StageReport | None, several: bool) -> tuple[str, ...]:
+    """several: files of more than one stage of shearing are among them, so that it is named."""
+    name = Path(one.test.file).name
+    if several and stage is not None:
+        name += f", stage {stage.number} {stage.name or stage.kind}"
+    state = "complete" if one.test.complete else "incomplete"
+    return (name, str(one.test.grains), str(one.test.seed), *_cells(_values(one, stage)), state)
 
 
 FORMS = (".4f", ".3f", ".3f", ".0f", ".0f", "+.3f", ".0f", ".1e")
