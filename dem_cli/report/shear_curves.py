@@ -46,6 +46,7 @@ class Curve:
     peak: int | None
     reverses: bool
     undrained: bool
+    dash: str = "-"
 
     @property
     def strain(self) -> Floats:
@@ -76,7 +77,7 @@ def mark_peak(ax: Axes, x: Floats, y: Floats, peak: int | None) -> None:
         ax.plot(x[peak], y[peak], "o", color="black", ms=4.5, zorder=5, label="_peak", clip_on=False)
 
 
-def mark_events(ax: Axes, x: Floats, rows: Rows) -> None:
+def mark_events(ax: Axes, x: Floats, rows: Rows, colour: str = EVENT) -> None:
     """Small strokes along the foot of the panel at the increments that passed through a collapse."""
     events = rows["event"] > 0
     if events.any():
@@ -85,7 +86,7 @@ def mark_events(ax: Axes, x: Floats, rows: Rows) -> None:
             x[events],
             np.full(np.count_nonzero(events), 0.02),
             "|",
-            color=EVENT,
+            color=colour,
             ms=7,
             mew=1.2,
             transform=where,
@@ -100,7 +101,7 @@ def panel_ratio(ax: Axes, some: Sequence[Curve]) -> None:
     """s1/s2 over the shear strain; the sine of the mobilised friction angle on the right."""
     for one in some:
         y = one.rows["stress_ratio"]
-        ax.plot(one.strain, y, color=one.colour, label=one.label)
+        ax.plot(one.strain, y, color=one.colour, ls=one.dash, label=one.label)
         mark_peak(ax, one.strain, y, one.peak)
     ax.set(xlabel=STRAIN, ylabel="stress ratio s1/s2")
     right = ax.secondary_yaxis("right", functions=(_sine, _ratio))  # type: ignore[arg-type]
@@ -119,9 +120,9 @@ def _ratio(sine: Floats) -> Floats:
 def panel_volume(ax: Axes, some: Sequence[Curve]) -> None:
     for one in some:
         y = 100.0 * one.rows["volumetric_strain"]
-        ax.plot(one.strain, y, color=one.colour, label=one.label)
+        ax.plot(one.strain, y, color=one.colour, ls=one.dash, label=one.label)
         mark_peak(ax, one.strain, y, one.peak)
-        mark_events(ax, one.strain, one.rows)
+        mark_events(ax, one.strain, one.rows, one.colour if len(some) > 1 else EVENT)
     ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
     ax.set(xlabel=STRAIN, ylabel="volumetric strain e_v [%]")
 
@@ -129,7 +130,7 @@ def panel_volume(ax: Axes, some: Sequence[Curve]) -> None:
 def panel_deviator(ax: Axes, some: Sequence[Curve]) -> None:
     for one in some:
         y = 1e-3 * one.rows["deviator"]
-        ax.plot(one.strain, y, color=one.colour, label=one.label, lw=_thin(one))
+        ax.plot(one.strain, y, color=one.colour, ls=one.dash, label=one.label, lw=_thin(one))
         mark_peak(ax, one.strain, y, one.peak)
     ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
     ax.set(xlabel=STRAIN, ylabel="deviator s1 - s2 [kPa]")
@@ -139,7 +140,7 @@ def panel_path(ax: Axes, some: Sequence[Curve]) -> None:
     """Stress path: s1 - s2 over the effective mean stress; a ring where it starts."""
     for one in some:
         x, y = 1e-3 * one.rows["mean_stress"], 1e-3 * one.rows["deviator"]
-        ax.plot(x, y, color=one.colour, label=one.label, lw=_thin(one))
+        ax.plot(x, y, color=one.colour, ls=one.dash, label=one.label, lw=_thin(one))
         ax.plot(x[0], y[0], "o", mfc="white", mec=one.colour, ms=4.5, zorder=4, label="_start")
         mark_peak(ax, x, y, one.peak)
     ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
@@ -149,7 +150,7 @@ def panel_path(ax: Axes, some: Sequence[Curve]) -> None:
 
 def panel_water(ax: Axes, some: Sequence[Curve]) -> None:
     for one in some:
-        ax.plot(_along(one, some), 1e-3 * one.rows["pore_pressure"], color=one.colour, label=one.label)
+        ax.plot(_along(one, some), 1e-3 * one.rows["pore_pressure"], color=one.colour, ls=one.dash, label=one.label)
         mark_peak(ax, _along(one, some), 1e-3 * one.rows["pore_pressure"], one.peak)
     first = some[0].rows["mean_stress"][0]
     if np.isfinite(first):
@@ -160,7 +161,7 @@ def panel_water(ax: Axes, some: Sequence[Curve]) -> None:
 def panel_strain(ax: Axes, some: Sequence[Curve]) -> None:
     """Shear strain over the increments."""
     for one in some:
-        ax.plot(one.rows["in_stage"], one.strain, color=one.colour, label=one.label)
+        ax.plot(one.rows["in_stage"], one.strain, color=one.colour, ls=one.dash, label=one.label)
     ax.set(xlabel=INCREMENT, ylabel=STRAIN)
 
 
@@ -293,7 +294,11 @@ def draw_stress_strain(results: Results, number: int | None) -> Figure:
 def draw_compared(several: Sequence[Results], number: int | None) -> Figure:
     """The same of one stage of each file: stage `number`, or the first that shears the sample."""
     some = [
-        replace(curve(one, one_shear_stage(one, number), COLORS[k % len(COLORS)]), label=one.path.stem)
+        replace(
+            curve(one, one_shear_stage(one, number), COLORS[k % len(COLORS)]),
+            label=one.path.stem,
+            dash=("-", "--", ":", "-.")[k // len(COLORS) % 4],
+        )
         for k, one in enumerate(several)
     ]
     figure = _stress_figure(some)

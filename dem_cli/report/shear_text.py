@@ -269,5 +269,5 @@ def _pooled(values: np.ndarray[tuple[int, int], np.dtype[np.float64]], grains: s
         spread = f" +- {number(float(known.std(ddof=1)), form.lstrip('+'))}" if len(known) > 1 else ""
         mean.append(number(float(known.mean()), form) + spread if len(known) else NOTHING)
         median.append(number(float(np.median(known)), form) if len(known) else NOTHING)
-    count = str(len(values))
-    return [("mean +- sd", grains, count, *mean, ""), ("median", grains, count, *median, "")]
+    count = len(values)
+    return [(f"mean of {count} +- sd", grains, "", *mean, ""), (f"median of {count}", grains, "", *median, "")]
