@@ -74,7 +74,7 @@ def draw_sample(
         first = first_frame_of_stage(results, frame.stage)
         begin = frame if first == index else results.frame(first)
     shown = ~frame.grains.escaped
-    values = np.asarray(quantity.values(frame, begin), dtype=float)
+    values = np.array(quantity.values(frame, begin), dtype=float)  # a copy: what follows changes it
     if results.boundary:
         values[-results.boundary :] = np.nan
     values = values[shown]
