@@ -24,7 +24,9 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def over_time(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return report_samples.make_file(tmp_path_factory.mktemp("run") / "run.h5", interval=0.5, columns=5, rows=5, tracks=(1, 2))
+    return report_samples.make_file(
+        tmp_path_factory.mktemp("run") / "run.h5", interval=0.5, columns=5, rows=5, tracks=(1, 2)
+    )
 
 
 def call(command: object, *arguments: object) -> Result:

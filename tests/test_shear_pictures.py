@@ -236,6 +236,19 @@ def test_rectangles_lie_along_the_forces(results: Results) -> None:
     np.testing.assert_allclose(to_point[:, 0] * axis[:, 1] - to_point[:, 1] * axis[:, 0], 0.0, atol=1e-12)
 
 
+def test_fewer_grains_than_walls(tmp_path: Path) -> None:
+    """The number of a wall is then no number of a grain from the end either."""
+    states = [made.lattice(columns=1, rows=1, number=k, in_stage=k, stage=k // 2, stage_start=k != 1) for k in range(3)]
+    with made.open_writer(tmp_path / "one.h5", states[0], tracks=None) as writer:
+        for state in states:
+            made.write_increment(writer, state)
+        writer.finish("done")
+    with open_results(tmp_path / "one.h5") as results:
+        assert len(shear_forces.rectangles(results.increment(0), 1.0)) == 4
+        for what in ("sample", "forces"):
+            assert drawn(results, what=what, frame=0).axes
+
+
 def test_forces_at_start_and_peak_on_one_scale(results: Results) -> None:
     figure = drawn(results, what="forces")
     left, right = figure.axes

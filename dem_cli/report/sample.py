@@ -257,8 +257,9 @@ def _draw_chains(ax: Axes, frame: AnyFrame, factor: float, points_per_meter: flo
     i, j = c.i[keep], c.j[keep]
     to_wall = j < 0
     x, y = bodies.centers(g)
-    end_x = np.where(to_wall, c.px[keep], x[j])
-    end_y = np.where(to_wall, c.py[keep], y[j])
+    other = np.maximum(j, 0)  # the number of a wall may be none of an element
+    end_x = np.where(to_wall, c.px[keep], x[other])
+    end_y = np.where(to_wall, c.py[keep], y[other])
     segments = np.stack([np.column_stack([x[i], y[i]]), np.column_stack([end_x, end_y])], axis=1) / factor
     width = min(radius, 5.0) * np.minimum(c.normal[keep] / widest, 1.0)
     if not small:

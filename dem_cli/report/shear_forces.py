@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FORCE = "#B2182B"
 GRAIN = "#F4F1EA"
-WIDEST = 0.7  # width of the largest force over the mean radius
+WIDEST = 0.5  # width of the largest force over the mean radius
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def rectangles(frame: StoredIncrement, largest: float) -> Floats:
     across = np.column_stack([-along[:, 1], along[:, 0]]) * half[:, None]
     point = np.column_stack([c.px, c.py])
     back = point - along * g.radius[c.i][:, None]
-    front = point + along * np.where(c.j < 0, 0.0, g.radius[c.j])[:, None]
+    front = point + along * np.where(c.j < 0, 0.0, g.radius[np.maximum(c.j, 0)])[:, None]
     return np.stack([back - across, front - across, front + across, back + across], axis=1)
 
 
