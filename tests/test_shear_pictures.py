@@ -157,6 +157,12 @@ def test_principal_values_and_their_sum(results: Results) -> None:
     np.testing.assert_allclose(sums, rows["coordination"])
 
 
+def test_principal_values_of_a_turned_tensor() -> None:
+    rows = {"t_xx": np.array([2.0]), "t_xy": np.array([1.5]), "t_yy": np.array([-2.0])}
+    large, small = shear_curves.principal(rows, "t")
+    assert (large[0], small[0]) == (pytest.approx(2.5), pytest.approx(-2.5))
+
+
 def test_work_and_dissipation_over_the_volume(results: Results) -> None:
     rows = stage_rows(results, 2)
     ax = drawn(results, what="dissipation").axes[0]
@@ -260,6 +266,7 @@ def test_forces_at_start_and_peak_on_one_scale(results: Results) -> None:
     widest = [max(np.hypot(*(path.vertices[3] - path.vertices[0])) for path in some.get_paths()) for some in polygons]
     forces = [shear_forces.largest_force([frame]) for frame in frames]
     assert widest[0] / widest[1] == pytest.approx(forces[0] / forces[1])
+    assert widest[1] == pytest.approx(100.0 * shear_forces.WIDEST * made.RADIUS)  # the largest of both, in cm
 
 
 def test_walls_are_where_they_are_then(results: Results) -> None:
@@ -283,6 +290,8 @@ def test_boundary_grains_have_a_tone_of_their_own(ring: Path) -> None:
 
 def test_view_holds_grains_and_walls(results: Results, ring: Path) -> None:
     frame = results.increment(0)
+    wide = replace(frame, walls=made.box(1.0, 2.0))
+    assert frame_box(wide)[1::2] == (1.0, 2.0)
     assert frame_box(frame) == pytest.approx((0.0, frame.width, 0.0, frame.height), abs=1e-4)
     with open_results(ring) as other:
         g = other.increment(0).grains
@@ -384,12 +393,15 @@ def test_ranked_contacts_and_the_line_of_the_first(results: Results) -> None:
     assert table is not None
     titles = [ax.get_title() for ax in figure.axes]
     assert titles == ["first, increment 1", "turn, increment 15", "peak, increment 36", "after the peak, increment 37"]
+    first = shear_page.line_of(table.share[int(np.flatnonzero(table.increment == FIRST + 1)[0])])
+    assert first is not None
     straight = [lines(ax)["first increment"].get_xdata() for ax in figure.axes]
     for ax, k, line in zip(figure.axes, (1, 15, 36, 37), straight, strict=True):
         row = int(np.flatnonzero(table.increment == FIRST + k)[0])
         np.testing.assert_allclose(lines(ax)["contacts"].get_xdata(), 100.0 * table.share[row])
         np.testing.assert_allclose(lines(ax)["contacts"].get_ydata(), np.arange(1, 21))
         np.testing.assert_allclose(line, straight[0])
+        np.testing.assert_allclose(first[0] + first[1] * np.log(line / 100.0), np.log([0.7, 28.0]))
 
 
 def test_nothing_slid(results: Results, monkeypatch: pytest.MonkeyPatch) -> None:
