@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -23,7 +24,9 @@ import click
     help="Draw a picture too: PNG, SVG or PDF [default with --what: compare-KIND.png].",
 )
 @click.option(
-    "--what", metavar="KIND", help="The picture: table, grid, histories or trajectories [default with -o: table]."
+    "--what",
+    metavar="KIND",
+    help="The picture: table, grid, histories or trajectories, of shear tests stress-strain [default: table].",
 )
 @click.option(
     "--stage", type=int, metavar="N", help="Histories, trajectories: stage N from 1 [default: the last of shaking]."
@@ -55,6 +58,9 @@ def command(
     trajectories  their paths, likewise
 
     Histories and trajectories show the first run of each case.
+
+    Quasi-static shear tests are compared by peak, turn of the volume change and energy; their one picture is
+    stress-strain, a curve a file.
     """
     # Imported here so that `dem --help` stays quick.
     import json
@@ -63,9 +69,15 @@ def command(
     from dem_cli.report.compare import compare
     from dem_cli.report.compare_figures import check_request, draw
     from dem_cli.report.compare_text import blocks
+    from dem_cli.report.kinds import axis_of
     from dem_cli.report.look import check_target, save, style
     from dem_cli.report.text import show
 
+    if axis_of(files) == "increment":
+        _shear_tests(
+            files, each, as_json, output, what, stage, dpi, force, idle={"--thesis": with_thesis, "--grains": grains}
+        )
+        return
     target = output or (Path(f"compare-{what}.png") if what else None)
     check_request(what or "table", stage=stage is not None)
     if target:
@@ -79,3 +91,50 @@ def command(
         click.echo(json.dumps(found.as_dict(), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         show(blocks(found, grains=grains), sys.stdout)
+
+
+def _shear_tests(
+    files: tuple[Path, ...],
+    each: bool,
+    as_json: bool,
+    output: Path | None,
+    what: str | None,
+    stage: int | None,
+    dpi: float,
+    force: bool,
+    idle: Mapping[str, bool],
+) -> None:
+    """The same for quasi-static shear tests. idle: options that say nothing about them. ScenarioError if one is given."""
+    import json
+    import sys
+    from contextlib import ExitStack
+
+    from dem_cli.errors import ScenarioError
+    from dem_cli.report.look import check_target, save, style
+    from dem_cli.report.shear import shear_summary
+    from dem_cli.report.shear_curves import draw_compared
+    from dem_cli.report.shear_text import comparison
+    from dem_cli.report.text import show
+    from dem_cli.results import open_results
+
+    for option, given in idle.items():
+        if given:
+            raise ScenarioError(f"{option} has no meaning for quasi-static tests")
+    if what not in (None, "stress-strain"):
+        raise ScenarioError(f'--what "{what}": quasi-static tests are compared in one picture, stress-strain')
+    target = output or (Path(f"compare-{what}.png") if what else None)
+    if stage is not None and target is None:
+        raise ScenarioError("--stage chooses what is drawn: add --what stress-strain")
+    if target:
+        check_target(target, force)
+    with ExitStack() as stack:
+        opened = [stack.enter_context(open_results(path)) for path in files]
+        found = [shear_summary(results) for results in opened]
+        if target:
+            with style():
+                save(draw_compared(opened, stage), target, dpi)
+            click.echo(f"wrote {target}", err=True)
+    if as_json:
+        click.echo(json.dumps([one.as_dict() for one in found], indent=2, ensure_ascii=False, allow_nan=False))
+    else:
+        show([comparison(found, each=each)], sys.stdout)

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import click
 
+AT_ONE_FRAME = ("sample", "rose", "forces", "normals", "energy-normals")
+
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
@@ -20,11 +22,22 @@ import click
 @click.option(
     "--what",
     metavar="KIND",
-    help="sample, rose, histories, trajectories, surface, energy, motion or series [default: sample].",
+    help="One of the kinds below [default: sample].",
 )
 @click.option("--time", type=float, metavar="T", help="Sample, rose: the frame nearest to T seconds.")
-@click.option("--frame", type=int, metavar="K", help="Sample, rose: frame K from 0, or -1, -2, ... from the last.")
-@click.option("--last", is_flag=True, help="Sample, rose: the last frame (the default).")
+@click.option(
+    "--frame",
+    type=int,
+    metavar="K",
+    help="Sample, rose, forces, normals: frame K from 0, or -1, -2, ... from the last.",
+)
+@click.option(
+    "--increment",
+    type=int,
+    metavar="K",
+    help="Shear tests: the frame nearest to increment K of the run, or of --stage.",
+)
+@click.option("--last", is_flag=True, help="Likewise: the last frame (of sample and rose the default).")
 @click.option(
     "--stage", type=int, metavar="N", help="Only stage N, from 1 (0: whole run); sample, rose: its last frame."
 )
@@ -56,6 +69,7 @@ def command(
     what: str | None,
     time: float | None,
     frame: int | None,
+    increment: int | None,
     last: bool,
     stage: int | None,
     color: str | None,
@@ -78,7 +92,24 @@ def command(
     surface       free surface over place and time, and its antisymmetric mode
     energy        ledger of energy as stacked areas
     motion        acceleration, velocity and displacement of the container
-    series        any quantity of /series over time
+    series        any quantity of /series over time, or over increments
+
+    \b
+    Of quasi-static shear tests (figures of Kishino 1988):
+    stress-strain   stress ratio and volumetric strain over the shear strain; of closed pores
+                    stress path and pore pressure too (7, 9)
+    forces          contact forces as rectangles at the start and the peak (6, 8, 10)
+    normals         rose of contact normals in percent, start and peak (11)
+    energy-normals  the same, weighted by elastic energy (12)
+    coordination    principal values of the coordination tensor (13)
+    energy-tensor   principal values of the tensor of elastic energy (14)
+    dissipation     work, dissipation and elastic energy (15)
+    largest-share   share of the contact that dissipates most in each increment (16)
+    ranked          contacts ranked by their share in chosen increments (17)
+    paper           all of them on a page
+
+    They show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
+    normals show one frame with --increment, --frame or --last.
 
     QUANTITY is radius, id, body, aspect, orientation, speed, spin, displacement, displacement_x,
     displacement_y, rotation, coordination, pressure, shear_stress, stress_xx, stress_yy or stress_xy;
@@ -89,29 +120,32 @@ def command(
     """
     # Imported here so that `dem --help` stays quick.
     from dem_cli.errors import ScenarioError
-    from dem_cli.report.figures import DEFAULT_SERIES, Picture, check_request, choose_frame, draw
+    from dem_cli.report.figures import Picture, check_request, choose_frame, draw
     from dem_cli.report.look import check_target, save, style
     from dem_cli.results import open_results
 
-    if sum((time is not None, frame is not None, last)) > 1:
-        raise ScenarioError("--time, --frame and --last exclude each other")
+    if sum((time is not None, frame is not None, increment is not None, last)) > 1:
+        raise ScenarioError("--time, --frame, --increment and --last exclude each other")
     picture = Picture(
         what=what or ("series" if series else "sample"),
         time=time,
         frame=-1 if last else frame,
+        increment=increment,
         stage=stage,
         color=color or "displacement",
         chains=chains,
         bonds=bonds,
         marks=marks,
         limits=_pair(limits) if limits else None,
-        series=[name.strip() for name in series.split(",")] if series else DEFAULT_SERIES,
+        series=[name.strip() for name in series.split(",")] if series else None,
         grains=_whole(grains) if grains else None,
     )
     check_request(picture)
-    moment = time is not None or frame is not None or last
+    moment = frame is not None or last
     given = {
-        "--time/--frame/--last": moment,
+        "--time": time is not None,
+        "--frame/--last": moment,
+        "--increment": increment is not None,
         "--color": color,
         "--chains/--no-chains": chains is not None,
         "--bonds/--no-bonds": bonds is not None,
@@ -128,6 +162,11 @@ def command(
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
         with style():
             save(draw(results, picture), target, dpi)
+        if increment is not None:
+            shown = float(results.frame_times[choose_frame(results, picture)])
+            asked = increment + (results.stages[stage - 1].start if stage else 0.0)
+            if shown != asked:
+                click.echo(f"nearest frame: increment {shown:g} of the run", err=True)
         if time is not None:
             shown = float(results.frame_times[choose_frame(results, picture)])
             if abs(shown - time) > 1e-9:
@@ -140,7 +179,9 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
     from dem_cli.errors import ScenarioError
 
     kinds = {
-        "--time/--frame/--last": ("sample", "rose"),
+        "--time": ("sample", "rose"),
+        "--frame/--last": AT_ONE_FRAME,
+        "--increment": AT_ONE_FRAME,
         "--color": ("sample",),
         "--chains/--no-chains": ("sample",),
         "--bonds/--no-bonds": ("sample",),
@@ -150,8 +191,11 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
         "--range": ("sample", "surface"),
     }
     for option, value in given.items():
+        names = (
+            " and ".join((", ".join(kinds[option][:-1]), kinds[option][-1])) if kinds[option][1:] else kinds[option][0]
+        )
         if value and what not in kinds[option]:
-            raise ScenarioError(f"{option} has no meaning for --what {what}, only for {' and '.join(kinds[option])}")
+            raise ScenarioError(f"{option} has no meaning for --what {what}, only for {names}")
 
 
 def _pair(text: str) -> tuple[float, float]:

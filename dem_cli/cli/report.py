@@ -21,30 +21,41 @@ import click
 def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: bool) -> None:
     """Print what result FILEs say.
 
-    One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings. Several
-    FILEs: one table to compare them, a row a file. --json prints an object for one FILE and a list for
-    several; its keys are those of the dataclasses in dem_cli/report/summary.py. --csv writes series.csv,
-    stages.csv, surface.csv and tracks.csv; with several FILEs into one folder a file below DIR.
+    One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
+    quasi-static shear test the turn of the volume change, peak and residual state, energies, events and
+    iterations. Several FILEs: one table to compare them, a row a file; shear tests that differ in their seed only
+    get a row of their mean. --json prints an object for one FILE and a list for several; its keys are those of
+    the dataclasses in dem_cli/report/summary.py, of shear tests shear.py. --csv writes series.csv, stages.csv,
+    surface.csv (shear tests: dissipation.csv) and tracks.csv; with several FILEs into one folder a file below DIR.
     """
     # Imported here so that `dem --help` stays quick.
     import json
     import sys
 
-    from dem_cli.report.export import export_csv, folders
-    from dem_cli.report.summary import summary
-    from dem_cli.report.text import blocks, comparison, show
+    from dem_cli.report import export, shear, shear_text, summary, text
+    from dem_cli.report.kinds import axis_of
     from dem_cli.results import open_results
 
-    places = folders(files, folder) if folder is not None else [None] * len(files)
-    found = []
+    over_time = axis_of(files) == "time"
+    places = export.folders(files, folder) if folder is not None else [None] * len(files)
+    runs, tests = [], []
     for path, place in zip(files, places, strict=True):
         with open_results(path) as results:
-            found.append(summary(results))
-            if place is not None:
-                for table in export_csv(results, found[-1], place, force):
-                    click.echo(f"wrote {table}", err=True)
+            tables: list[Path] = []
+            if over_time:
+                runs.append(summary.summary(results))
+                if place is not None:
+                    tables = export.export_csv(results, runs[-1], place, force)
+            else:
+                tests.append(shear.shear_summary(results))
+                if place is not None:
+                    tables = export.export_shear_csv(results, tests[-1], place, force)
+            for table in tables:
+                click.echo(f"wrote {table}", err=True)
     if as_json:
-        trees = [s.as_dict() for s in found]
+        trees = [*(one.as_dict() for one in runs), *(one.as_dict() for one in tests)]
         click.echo(json.dumps(trees[0] if len(trees) == 1 else trees, indent=2, ensure_ascii=False, allow_nan=False))
+    elif over_time:
+        text.show(text.blocks(runs[0]) if len(runs) == 1 else [text.comparison(runs)], sys.stdout)
     else:
-        show(blocks(found[0]) if len(found) == 1 else [comparison(found)], sys.stdout)
+        text.show(shear_text.blocks(tests[0]) if len(tests) == 1 else [shear_text.comparison(tests)], sys.stdout)

@@ -15,6 +15,7 @@ from dem_cli.report import thesis
 from dem_cli.report.cases import Case, Pooled, pool, pooled
 from dem_cli.report.outcome import Outcome, outcome
 from dem_cli.report.thesis_checks import Beside, Check, beside, checks
+from dem_cli.report.tree import plain
 from dem_cli.results import open_results
 
 FORMAT = "dem-cli comparison"
@@ -57,8 +58,8 @@ class Comparison:
             "why": self.why,
             "warnings": self.said,
         }
-        plain: dict[str, Any] = _plain(tree)
-        return {"format": FORMAT, "format_version": FORMAT_VERSION, **plain}
+        found: dict[str, Any] = plain(tree)
+        return {"format": FORMAT, "format_version": FORMAT_VERSION, **found}
 
 
 def compare(files: Sequence[Path], *, with_thesis: bool = False, each: bool = False) -> Comparison:
@@ -131,13 +132,3 @@ def why(cases: Sequence[Case]) -> list[str]:
     if math.isfinite(overlap):
         lines.append(f"The largest overlap at the end of these runs is {overlap:.1e} of the smaller radius.")
     return lines
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

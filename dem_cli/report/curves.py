@@ -11,6 +11,7 @@ from dem_cli.report.look import (
     COLORS,
     DIVERGING,
     axis_label,
+    axis_name,
     display_unit,
     extension,
     heading,
@@ -50,7 +51,7 @@ def _inside(time: Floats, window: Window) -> Bools:
 
 def draw_series(results: Results, names: Sequence[str], window: Window, text: str) -> Figure:
     """One panel a series, all over the same time axis."""
-    time = np.asarray(results.series["time"])
+    time = np.asarray(results.series[results.axis])
     inside = _inside(time, window)
     figure = new_figure(7.0, 1.0 + 1.7 * len(names))
     axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
@@ -60,7 +61,7 @@ def draw_series(results: Results, names: Sequence[str], window: Window, text: st
         ax.plot(time[inside], values / factor, color=COLORS[k % len(COLORS)])
         ax.set_ylabel(axis_label(name.replace("_", " "), unit))
         if not np.isfinite(values).any():
-            ax.text(0.5, 0.5, "not defined in this time", transform=ax.transAxes, ha="center", color="0.35")
+            ax.text(0.5, 0.5, "not defined here", transform=ax.transAxes, ha="center", color="0.35")
     _time_axis(results, list(axes), time[inside])
     heading(figure, results, text)
     return figure
@@ -164,7 +165,7 @@ def _edges(middles: Floats) -> Floats:
 
 def _time_axis(results: Results, axes: Sequence[Axes], time: Floats) -> None:
     """Label the time axis under the last of `axes`, set its limits and show the stages."""
-    axes[-1].set_xlabel("t [s]")
+    axes[-1].set_xlabel(axis_name(results))
     low, high = float(time[0]), float(time[-1])
     if high > low:
         axes[-1].set_xlim(low, high)

@@ -5,15 +5,17 @@ kept.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.report.shear import STATE, ShearSummary
 from dem_cli.report.summary import MEASURES, Summary
 from dem_cli.results import Results
-from dem_cli.results.schema import SERIES, TRACKS
+from dem_cli.results.schema import INCREMENTS, SERIES, TRACKS
 
 Row = Sequence[object]
 
@@ -47,6 +49,22 @@ def export_csv(results: Results, summary: Summary, folder: Path, force: bool = F
     }
     if results.tracks is not None:
         tables["tracks.csv"] = _tracks(results)
+    return _write(tables, folder, force)
+
+
+def export_shear_csv(results: Results, summary: ShearSummary, folder: Path, force: bool = False) -> list[Path]:
+    """The same for a quasi-static test: series.csv has a row an increment, dissipation.csv a row an increment and rank."""
+    tables = {
+        "series.csv": _series(results),
+        "stages.csv": _shear_stages(summary),
+        "dissipation.csv": _dissipation(results),
+    }
+    if results.tracks is not None:
+        tables["tracks.csv"] = _tracks(results)
+    return _write(tables, folder, force)
+
+
+def _write(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool) -> list[Path]:
     paths = {name: folder / name for name in tables}
     there = [str(path) for path in paths.values() if path.exists()]
     if there and not force:
@@ -63,8 +81,8 @@ def export_csv(results: Results, summary: Summary, folder: Path, force: bool = F
 
 def _series(results: Results) -> Iterator[Row]:
     names = list(results.series)
-    if "time" not in names:
-        names.insert(0, "time")
+    if results.axis not in names:
+        names.insert(0, results.axis)
     yield [_head(name, results.series.unit(name)) for name in names]
     yield from zip(*(np.asarray(results.series[name]).tolist() for name in names), strict=True)
 
@@ -87,6 +105,58 @@ def _stages(summary: Summary) -> Iterator[Row]:
         yield [s.number, s.name, s.kind, s.start, s.end, s.reason, s.amplitude, s.frequency, *values]
 
 
+def _shear_stages(summary: ShearSummary) -> Iterator[Row]:
+    """State at both ends, and what the stage did: numbers of `shear.StageReport` in SI units."""
+    states = [_head(f"{name} {when}", INCREMENTS[name][0]) for when in ("before", "after") for name in STATE]
+    points = [
+        f"{name} {what}"
+        for what in ("turn", "peak", "end")
+        for name in ("increment", "shear strain", "volumetric strain", "s1/s2", "void ratio")
+    ]
+    energies = ("work", "elastic", "friction", "released", "residual")
+    yield [
+        "stage",
+        "name",
+        "kind",
+        "reason",
+        "increments",
+        "events",
+        *states,
+        *points,
+        *(f"{name} [J/m^3]" for name in energies),
+        "closure",
+    ]
+    for s in summary.stages:
+        row: list[object] = [s.number, s.name, s.kind, s.reason, s.increments, len(s.solver.events)]
+        row += [state[name] for state in (s.before, s.after) for name in STATE]
+        done = s.shearing
+        for point in (done.turn, done.peak, done.end) if done else (None, None, None):
+            row += (
+                [math.nan] * 5
+                if point is None
+                else [point.in_stage, point.shear_strain, point.volumetric_strain, point.stress_ratio, point.void_ratio]
+            )
+        yield [
+            *row,
+            *(
+                [math.nan] * 6
+                if done is None
+                else [*(getattr(done.energy, name) for name in energies), done.energy.closure]
+            ),
+        ]
+
+
+def _dissipation(results: Results) -> Iterator[Row]:
+    yield ["increment", "rank", "i", "j", "energy [J]", "share"]
+    table = results.dissipation
+    if table is None:
+        return
+    for k, increment in enumerate(table.increment.tolist()):
+        count = int(np.count_nonzero(np.isfinite(table.energy[k])))
+        columns = (table.rank, table.i[k], table.j[k], table.energy[k], table.share[k])
+        yield from zip([increment] * count, *(np.asarray(column)[:count].tolist() for column in columns), strict=True)
+
+
 def _surface(results: Results) -> Iterator[Row]:
     yield ["time [s]", "x [m]", "eta [m]"]
     surface = results.surface
@@ -100,7 +170,11 @@ def _tracks(results: Results) -> Iterator[Row]:
     if tracks is None:
         return
     names = [name for name in TRACKS if name in tracks.arrays]
-    yield ["time [s]", "grain", *(_head(name, TRACKS[name][0]) for name in names)]
+    yield [
+        "time [s]" if results.axis == "time" else "increment",
+        "grain",
+        *(_head(name, TRACKS[name][0]) for name in names),
+    ]
     ids: Iterable[int] = np.asarray(tracks.ids).tolist()
     columns = [np.asarray(tracks.arrays[name]) for name in names]
     for k, time in enumerate(np.asarray(tracks.time).tolist()):

@@ -16,28 +16,37 @@ from dem_cli.results import Results
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = ("sample", "rose", "histories", "trajectories", "surface", "energy", "motion", "series")
+KINDS = ("sample", "rose", "histories", "trajectories", "surface", "energy", "motion", "series")  # of runs over time
+# Of quasi-static shear tests, beside the five that need no time.
+SHEAR_KINDS = (
+    "stress-strain", "forces", "normals", "energy-normals", "coordination", "energy-tensor", "dissipation", "largest-share",
+    "ranked", "paper",
+)  # fmt: skip
+OVER_TIME = ("surface", "energy", "motion")  # kinds that a quasi-static test has not
 DEFAULT_SERIES = ("void_ratio", "depth", "coordination", "kinetic")
+INCREMENT_SERIES = ("stress_ratio", "volumetric_strain", "void_ratio", "coordination")
 
 
 @dataclass(frozen=True)
 class Picture:
     """What to draw. All quantities SI; None picks the default described in `dem render --help`.
 
-    time [s], frame (0-based, negative from the end), stage (1-based, 0 is the whole run), color: a quantity
-    of a grain, chains, bonds, marks: what is drawn over the grains, limits of the colours, series: names, grains: numbers of tracked grains.
+    time [s], frame (0-based, negative from the end), increment (of the run, or of the stage that is asked for), stage (1-based, 0 is
+    the whole run), color: a quantity of a grain, chains, bonds, marks: what is drawn over the grains, limits of the colours, series:
+    names, grains: numbers of tracked grains.
     """
 
     what: str = "sample"
     time: float | None = None
     frame: int | None = None
+    increment: int | None = None
     stage: int | None = None
     color: str = "displacement"
     chains: bool | None = None
     bonds: bool | None = None
     marks: bool = False
     limits: tuple[float, float] | None = None
-    series: Sequence[str] = DEFAULT_SERIES
+    series: Sequence[str] | None = None
     grains: Sequence[int] | None = None
 
 
@@ -50,6 +59,8 @@ def draw(results: Results, picture: Picture) -> Figure:
 
     check_request(picture)
     _check_file(results, picture)
+    if picture.what in SHEAR_KINDS:
+        return _draw_shear(results, picture)
     if picture.what == "sample":
         return sample.draw_sample(
             results,
@@ -67,24 +78,54 @@ def draw(results: Results, picture: Picture) -> Figure:
         return tracked.draw_histories(results, tracked.paths(results, window, picture.grains), text)
     if picture.what == "trajectories":
         return tracked.draw_trajectories(results, tracked.paths(results, window, picture.grains), text)
-    time = np.asarray(results.series["time"])
+    time = results.series[results.axis]
     if np.count_nonzero((time >= window[0] - 1e-9) & (time <= window[1] + 1e-9)) < 2:
-        raise ScenarioError(
-            f"{results.path}: holds fewer than two rows of series between {window[0]:g} s and {window[1]:g} s"
-        )
+        first, last = (f"t = {end:g} s" if results.axis == "time" else f"increment {end:g}" for end in window)
+        raise ScenarioError(f"{results.path}: holds fewer than two rows of series between {first} and {last}")
     if picture.what == "surface":
         return curves.draw_surface(results, window, text, picture.limits)
     if picture.what == "motion":
         return motions.draw_motion(results, window, text)
     if picture.what == "energy":
         return curves.draw_energy(results, window, text)
-    return curves.draw_series(results, picture.series, window, text)
+    return curves.draw_series(results, series_of(results, picture), window, text)
+
+
+def _draw_shear(results: Results, picture: Picture) -> Figure:
+    """A picture of SHEAR_KINDS: of the frame that is asked for, else of the start and the peak of a stage."""
+    from dem_cli.report import shear_curves, shear_forces, shear_page
+    from dem_cli.report.shear_rows import shear_stages
+
+    what, stage = picture.what, picture.stage or None
+    if what == "stress-strain":
+        return shear_curves.draw_stress_strain(results, stage)
+    if what == "ranked":
+        return shear_page.draw_ranked(results, stage)
+    if what == "paper":
+        return shear_page.draw_page(results, stage)
+    if what not in ("forces", "normals", "energy-normals"):
+        return shear_curves.draw_one(results, what, stage)
+    compressed_only = not shear_stages(results)
+    if compressed_only or picture.frame is not None or picture.increment is not None:
+        index = choose_frame(results, picture)
+        moments = [shear_forces.moment(results, index)]
+        number = moments[0].frame.stage + 1
+        text = stage_label(number, results.stages[number - 1]) if number <= len(results.stages) else "whole run"
+    else:
+        moments, text = shear_forces.start_and_peak(results, stage), shear_forces.stage_text(results, stage)
+    if what == "forces":
+        return shear_forces.draw_forces(results, moments, text)
+    return shear_forces.draw_roses(
+        results, moments, text, energy=what == "energy-normals", axial=moments[-1].frame.axial
+    )
 
 
 def choose_frame(results: Results, picture: Picture) -> int:
-    """Index of the stored frame that is asked for: by index, nearest to a time, last of a stage, or last of
+    """Index of the stored frame that is asked for: by index, nearest to a time or an increment, last of a stage, or last of
     all.
     """
+    from dem_cli.report.moments import frame_at, frames_of_stage
+
     count = results.n_frames
     if count == 0:
         raise ScenarioError(f"{results.path}: holds no frames; choose a shorter [output] frames and run again")
@@ -93,6 +134,8 @@ def choose_frame(results: Results, picture: Picture) -> int:
         if not -count <= picture.frame < count:
             raise ScenarioError(f"{results.path}: frame {picture.frame} is none of its {count} (0 to {count - 1})")
         return picture.frame % count
+    if picture.increment is not None:
+        return frame_at(results, picture.increment, picture.stage)
     if picture.time is not None:
         first, last = float(times[0]), float(times[-1])
         if not first - 1e-9 <= picture.time <= last + 1e-9:
@@ -100,6 +143,8 @@ def choose_frame(results: Results, picture: Picture) -> int:
                 f"{results.path}: time {picture.time:g} s lies outside its frames ({first:g} s to {last:g} s)"
             )
         return int(np.argmin(np.abs(times - picture.time)))
+    if picture.stage and results.axis == "increment":
+        return int(frames_of_stage(results, picture.stage)[-1])
     if picture.stage:
         stage = results.stages[picture.stage - 1]
         until = stage.end if np.isfinite(stage.end) else np.inf
@@ -110,13 +155,18 @@ def choose_frame(results: Results, picture: Picture) -> int:
     return count - 1
 
 
+def series_of(results: Results, picture: Picture) -> Sequence[str]:
+    """The series that are asked for, or those that most want to see."""
+    return picture.series or (DEFAULT_SERIES if results.axis == "time" else INCREMENT_SERIES)
+
+
 def choose_window(results: Results, picture: Picture) -> tuple[tuple[float, float], str]:
-    """Window of time [s] for a picture over time, and its description.
+    """Window of time [s], or of increments, for a picture over them, and its description.
 
     Without a stage: the whole run for series and energy, else the last stage (of shaking, if there is one).
     """
     stages = results.stages
-    time = np.asarray(results.series["time"])
+    time = results.series[results.axis]
     end = float(time[-1]) if len(time) else 0.0
     number = picture.stage
     if number is None:
@@ -137,8 +187,8 @@ def check_request(picture: Picture) -> None:
     """
     from dem_cli.report.quantities import QUANTITIES
 
-    if picture.what not in KINDS:
-        raise ScenarioError(unknown("kind of picture", picture.what, KINDS))
+    if picture.what not in (*KINDS, *SHEAR_KINDS):
+        raise ScenarioError(unknown("kind of picture", picture.what, (*KINDS, *SHEAR_KINDS)))
     if picture.what == "sample" and picture.color not in QUANTITIES:
         raise ScenarioError(unknown("quantity of a grain", picture.color, QUANTITIES))
     if picture.limits is not None and not picture.limits[1] > picture.limits[0]:
@@ -147,14 +197,40 @@ def check_request(picture: Picture) -> None:
 
 
 def _check_file(results: Results, picture: Picture) -> None:
+    if results.axis == "increment":
+        _check_increments(results, picture)
+    elif picture.what in SHEAR_KINDS:
+        raise ScenarioError(
+            f"{results.path}: --what {picture.what} shows a quasi-static shear test, this is a run over time; choose from {', '.join(KINDS)}"
+        )
+    elif picture.increment is not None:
+        raise ScenarioError(f"{results.path}: is a run over time; choose a frame with --time, not --increment")
     if picture.what == "series":
-        for name in picture.series:
+        for name in series_of(results, picture):
             if name not in results.series:
                 raise ScenarioError(f"{results.path}: " + unknown("series", name, results.series))
     if picture.stage is not None and not 0 <= picture.stage <= len(results.stages):
         count = len(results.stages)
         raise ScenarioError(
             f"{results.path}: stage {picture.stage} is none of its {count} (1 to {count}; 0: whole run)"
+        )
+
+
+def _check_increments(results: Results, picture: Picture) -> None:
+    """Raise ScenarioError for what a quasi-static test has not."""
+    from dem_cli.report.quantities import NOT_QUASI_STATIC
+
+    known = (*[kind for kind in KINDS if kind not in OVER_TIME], *SHEAR_KINDS)
+    if picture.what in OVER_TIME:
+        instead = "dissipation" if picture.what == "energy" else ", ".join(known)
+        raise ScenarioError(
+            f"{results.path}: a quasi-static test has no picture {picture.what}; choose --what {instead}"
+        )
+    if picture.time is not None:
+        raise ScenarioError(f"{results.path}: a quasi-static test has no time; choose a frame with --increment")
+    if picture.what == "sample" and picture.color in NOT_QUASI_STATIC:
+        raise ScenarioError(
+            f"{results.path}: a quasi-static test has no {picture.color}; choose --color displacement or rotation"
         )
 
 

@@ -146,6 +146,17 @@ def heading(figure: Figure, results: Results, text: str) -> None:
     figure.suptitle("\n".join([*lines, text + note]), parse_math=False)
 
 
+def axis_name(results: Results) -> str:
+    """Label of the axis that the file goes over."""
+    return "t [s]" if results.axis == "time" else "increment"
+
+
+def place_text(results: Results, index: int) -> str:
+    """Where frame `index` lies: `t = 2 s`, or `increment 40`."""
+    place = float(results.frame_times[index])
+    return f"t = {place:.6g} s" if results.axis == "time" else f"increment {place:.0f}"
+
+
 def stage_label(number: int, stage: Stage) -> str:
     """`stage 2 (shake)`, or with its name where that says more than the kind."""
     own = "" if stage.name in ("", stage.kind) else f", {stage.name}"

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dem_cli.report import bodies
-from dem_cli.results import StoredFrame
+from dem_cli.report.moments import AnyFrame
+from dem_cli.results import StoredIncrement
 from dem_cli.state import Floats
 
-Values = Callable[[StoredFrame, StoredFrame], Floats]
+Values = Callable[[AnyFrame, AnyFrame], Floats]
 
 
 @dataclass(frozen=True)
@@ -29,8 +30,13 @@ class Quantity:
     since: bool = False
 
 
-def _shear_stress(frame: StoredFrame, _: StoredFrame) -> Floats:
-    xx, xy, yx, yy = frame.stress.T
+def _stress(frame: AnyFrame) -> Floats:
+    """Of each element, (n, 4): xx, xy, yx, yy."""
+    return frame.grain_stress if isinstance(frame, StoredIncrement) else frame.stress
+
+
+def _shear_stress(frame: AnyFrame, _: AnyFrame) -> Floats:
+    xx, xy, yx, yy = _stress(frame).T
     return np.asarray(np.hypot(0.5 * (xx - yy), 0.5 * (xy + yx)))
 
 
@@ -39,7 +45,7 @@ def _moved(axis: str) -> Values:
     return lambda f, s: bodies.of_bodies(f.grains, getattr(f.grains, axis) - getattr(s.grains, axis))
 
 
-def _speed(f: StoredFrame, _: StoredFrame) -> Floats:
+def _speed(f: AnyFrame, _: AnyFrame) -> Floats:
     g = f.grains
     return np.asarray(np.hypot(bodies.of_bodies(g, g.vx), bodies.of_bodies(g, g.vy)))
 
@@ -63,12 +69,13 @@ QUANTITIES: dict[str, Quantity] = {
     ),
     "coordination": Quantity("contacts of the grain", "1", "count", lambda f, _: f.coordination.astype(float)),
     "pressure": Quantity(
-        "mean stress in the grain", "Pa", "from-zero", lambda f, _: 0.5 * (f.stress[:, 0] + f.stress[:, 3])
+        "mean stress in the grain", "Pa", "from-zero", lambda f, _: 0.5 * (_stress(f)[:, 0] + _stress(f)[:, 3])
     ),
     "shear_stress": Quantity("largest shear stress in the grain", "Pa", "from-zero", _shear_stress),
-    "stress_xx": Quantity("stress xx in the grain", "Pa", "from-zero", lambda f, _: f.stress[:, 0]),
-    "stress_yy": Quantity("stress yy in the grain", "Pa", "from-zero", lambda f, _: f.stress[:, 3]),
+    "stress_xx": Quantity("stress xx in the grain", "Pa", "from-zero", lambda f, _: _stress(f)[:, 0]),
+    "stress_yy": Quantity("stress yy in the grain", "Pa", "from-zero", lambda f, _: _stress(f)[:, 3]),
     "stress_xy": Quantity(
-        "stress xy in the grain", "Pa", "signed", lambda f, _: 0.5 * (f.stress[:, 1] + f.stress[:, 2])
+        "stress xy in the grain", "Pa", "signed", lambda f, _: 0.5 * (_stress(f)[:, 1] + _stress(f)[:, 2])
     ),
 }
+NOT_QUASI_STATIC = ("speed", "spin")  # what a test without time has not

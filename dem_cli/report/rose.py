@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, heading, new_figure, stage_label
+from dem_cli.report.look import COLORS, heading, new_figure, place_text, stage_label
 from dem_cli.results import Results
 from dem_cli.state import Floats
 
@@ -29,7 +29,7 @@ def draw_rose(results: Results, index: int) -> Figure:
     between = np.zeros(0, dtype=bool) if contacts is None else contacts.j >= 0
     if contacts is None or not between.any():
         raise ScenarioError(
-            f"{results.path}: grains do not touch each other at t = {frame.time:g} s; choose a later frame"
+            f"{results.path}: grains do not touch each other at {place_text(results, index)}; choose a later frame"
         )
     n = np.stack([contacts.nx[between], contacts.ny[between]])
     density = densities(n[0], n[1])
@@ -52,7 +52,7 @@ def draw_rose(results: Results, index: int) -> Figure:
     step = max(0.5, round(top / 4.0))
     ax.set_yticks(np.arange(step, top, step).tolist())
     ax.set_rlabel_position(22.5)
-    text = f"t = {frame.time:.6g} s"
+    text = place_text(results, index)
     if 0 <= frame.stage < len(results.stages):
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
     heading(figure, results, f"Contact normals between grains, {text}")

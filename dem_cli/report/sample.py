@@ -18,8 +18,10 @@ from dem_cli.report.look import (
     heading,
     largest,
     new_figure,
+    place_text,
     stage_label,
 )
+from dem_cli.report.moments import BOUNDARY, AnyFrame, frame_box, frames_of_stage
 from dem_cli.report.quantities import QUANTITIES, Quantity
 from dem_cli.report.strokes import (
     EDGE,
@@ -30,7 +32,7 @@ from dem_cli.report.strokes import (
     draw_marks,
     draw_outlines,
 )
-from dem_cli.results import Results, StoredFrame
+from dem_cli.results import Results
 from dem_cli.state import Bools, Floats
 
 if TYPE_CHECKING:
@@ -72,7 +74,10 @@ def draw_sample(
         first = first_frame_of_stage(results, frame.stage)
         begin = frame if first == index else results.frame(first)
     shown = ~frame.grains.escaped
-    values = np.asarray(quantity.values(frame, begin), dtype=float)[shown]
+    values = np.array(quantity.values(frame, begin), dtype=float)  # a copy: what follows changes it
+    if results.boundary:
+        values[-results.boundary :] = np.nan
+    values = values[shown]
 
     box = _view(results, frame, shown)
     factor, unit = display_unit("m", max(box[1] - box[0], box[3] - box[2]))
@@ -84,7 +89,7 @@ def draw_sample(
     ax.set_ylim(box[2] / factor, box[3] / factor)
     ax.set_xlabel(axis_label("x", unit))
     ax.set_ylabel(axis_label("y", unit))
-    _draw_grains(ax, frame, shown, values, quantity, factor, limits)
+    _draw_grains(ax, frame, shown, values, quantity, factor, limits, BOUNDARY if results.boundary else None)
     points = _points_per_meter(box)
     radius = float(np.mean(frame.grains.radius)) * points
     if bonds or (bonds is None and radius >= SMALL_RADIUS):
@@ -95,7 +100,7 @@ def draw_sample(
     if marks:
         draw_marks(ax, frame.grains.take(shown), factor, radius)
     _draw_walls(ax, frame, box, factor)
-    text = f"t = {frame.time:.6g} s"
+    text = place_text(results, index)
     if 0 <= frame.stage < len(results.stages):
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
     heading(figure, results, text)
@@ -108,10 +113,12 @@ def first_frame_of_stage(results: Results, stage: int) -> int:
     """Index of the frame nearest to the start of `stage` (0-based); 0 where the stage is unknown."""
     if not 0 <= stage < len(results.stages):
         return 0
+    if results.axis == "increment":
+        return int(frames_of_stage(results, stage + 1)[0])
     return int(np.argmin(np.abs(results.frame_times - results.stages[stage].start)))
 
 
-def _view(results: Results, frame: StoredFrame, shown: Bools) -> tuple[float, float, float, float]:
+def _view(results: Results, frame: AnyFrame, shown: Bools) -> tuple[float, float, float, float]:
     """What is drawn (x0, x1, y0, y1) [m]: the container up to the highest grain, with its top if that is
     near.
     """
@@ -124,6 +131,8 @@ def _view(results: Results, frame: StoredFrame, shown: Bools) -> tuple[float, fl
     if results.height is not None and results.height < 1.5 * top:
         top = max(top, results.height)
     top = max(top, 0.1 * results.width)
+    if results.axis == "increment":  # walls move
+        left, right, bottom, top = frame_box(frame)
     margin = 0.02 * max(right - left, top - bottom)
     return left - margin, right + margin, bottom - margin, top + margin
 
@@ -142,13 +151,15 @@ def _points_per_meter(box: tuple[float, float, float, float]) -> float:
 
 def _draw_grains(
     ax: Axes,
-    frame: StoredFrame,
+    frame: AnyFrame,
     shown: Bools,
     values: Floats,
     quantity: Quantity,
     factor: float,
     limits: tuple[float, float] | None,
+    undefined: str | None = None,
 ) -> None:
+    """undefined: colour of grains without a value, boundary grains among them."""
     from matplotlib.collections import EllipseCollection
 
     grains = frame.grains.take(shown)
@@ -157,6 +168,8 @@ def _draw_grains(
         values = finite = values % len(PALETTE)
     scale, unit = display_unit(quantity.unit, largest(finite) if limits is None else largest(np.array(limits)))
     norm, cmap, extend = _colors(finite / scale, quantity.kind, None if limits is None else np.array(limits) / scale)
+    if undefined is not None:
+        cmap = cmap.with_extremes(bad=undefined)
     edges = grains.grain_count <= MOST_EDGES
     widths = np.full(len(grains), EDGE_WIDTH if edges else 0.0)
     widths[bodies.several(grains)] = 0.0
@@ -225,7 +238,7 @@ def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize
     return Normalize(low, high), cmap, extend
 
 
-def _draw_chains(ax: Axes, frame: StoredFrame, factor: float, points_per_meter: float) -> str:
+def _draw_chains(ax: Axes, frame: AnyFrame, factor: float, points_per_meter: float) -> str:
     """Lines from centre to centre of the grains (or to the wall), as wide as the normal force is large. Returns their caption.
 
     The 99.5th percentile is as wide as half a mean grain; forces below a fiftieth of it are left out, and where
@@ -244,8 +257,9 @@ def _draw_chains(ax: Axes, frame: StoredFrame, factor: float, points_per_meter: 
     i, j = c.i[keep], c.j[keep]
     to_wall = j < 0
     x, y = bodies.centers(g)
-    end_x = np.where(to_wall, c.px[keep], x[j])
-    end_y = np.where(to_wall, c.py[keep], y[j])
+    other = np.maximum(j, 0)  # the number of a wall may be none of an element
+    end_x = np.where(to_wall, c.px[keep], x[other])
+    end_y = np.where(to_wall, c.py[keep], y[other])
     segments = np.stack([np.column_stack([x[i], y[i]]), np.column_stack([end_x, end_y])], axis=1) / factor
     width = min(radius, 5.0) * np.minimum(c.normal[keep] / widest, 1.0)
     if not small:
@@ -257,7 +271,7 @@ def _draw_chains(ax: Axes, frame: StoredFrame, factor: float, points_per_meter: 
     return f"lines: {which}, the widest {widest / scale:.3g} {name} or more"
 
 
-def _draw_walls(ax: Axes, frame: StoredFrame, box: tuple[float, float, float, float], factor: float) -> None:
+def _draw_walls(ax: Axes, frame: AnyFrame, box: tuple[float, float, float, float], factor: float) -> None:
     """Walls as lines; those without an end (their coordinate is infinite) end beyond the picture."""
     w = frame.walls
     far = 10.0 * max(box[1] - box[0], box[3] - box[2])

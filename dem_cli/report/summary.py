@@ -19,6 +19,7 @@ from dem_cli import units
 from dem_cli.analysis.sloshing import surface_period, theory_period, thesis_period
 from dem_cli.report.cautions import cautions, largest_of
 from dem_cli.report.motions import Motion, motion_of
+from dem_cli.report.tree import plain
 from dem_cli.results import Results, Stage
 from dem_cli.state import Floats, Grains
 
@@ -168,7 +169,7 @@ class Summary:
 
     def as_dict(self) -> dict[str, Any]:
         """Tree for JSON: no NaN, no infinity (both null), no tuples."""
-        tree: dict[str, Any] = _plain(dataclasses.asdict(self))
+        tree: dict[str, Any] = plain(dataclasses.asdict(self))
         return {"format": FORMAT, "format_version": FORMAT_VERSION, **tree}
 
 
@@ -346,13 +347,3 @@ def _quantity(table: dict[str, Any], key: str, unit: str) -> float:
 
 def _ends(values: Floats) -> tuple[float, float]:
     return (float(values.min()), float(values.max())) if len(values) else (math.nan, math.nan)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, SEQUENTIAL, axis_label, display_unit, heading, largest, new_figure
+from dem_cli.report.look import COLORS, SEQUENTIAL, axis_label, axis_name, display_unit, heading, largest, new_figure
 from dem_cli.results import Results
 from dem_cli.state import Floats, Ints
 
@@ -53,7 +53,8 @@ def paths(results: Results, window: tuple[float, float], grains: Sequence[int] |
         )
     inside = (tracks.time >= window[0] - 1e-9) & (tracks.time <= window[1] + 1e-9)
     if np.count_nonzero(inside) < 2:
-        raise ScenarioError(f"{results.path}: holds no tracks between {window[0]:g} s and {window[1]:g} s")
+        unit = "s" if results.axis == "time" else "increments"
+        raise ScenarioError(f"{results.path}: holds no tracks between {window[0]:g} and {window[1]:g} {unit}")
     columns = [known[number] for number in grains]
     part = {name: np.asarray(tracks.arrays[name])[inside][:, columns] for name in ("x", "y", "angle")}
     return Paths(ids=np.array(grains, dtype=np.int64), time=np.asarray(tracks.time)[inside], **part)
@@ -86,7 +87,7 @@ def draw_histories(results: Results, tracked: Paths, text: str) -> Figure:
             *right.plot(tracked.time, angle[:, k] / turn, color=COLORS[2], ls=(0, (1, 1)), label="rotation (right)"),
         ]
         ax.set_title(f"No. {tracked.ids[k]}")
-        _outer_labels(ax, k, count, columns, "t [s]", axis_label("displacement", unit))
+        _outer_labels(ax, k, count, columns, axis_name(results), axis_label("displacement", unit))
         if (k + 1) % columns and k + 1 < count:
             right.tick_params(labelright=False)
         else:
@@ -133,7 +134,7 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
         _outer_labels(ax, k, count, columns, axis_label("x - x$_0$", unit), axis_label("y - y$_0$", unit))
     if lines is not None:
         bar = figure.colorbar(lines, ax=axes, aspect=35, pad=0.02)
-        bar.set_label("t [s]")
+        bar.set_label(axis_name(results))
     heading(figure, results, f"Trajectories in the container, {text}{_left_out(tracked)}")
     return figure
 

@@ -156,6 +156,11 @@ class Results:
         """Where the frames lie on the axis, shape (n_frames,): times [s], or numbers of increments."""
         return np.asarray(self._file["VTKHDF/Steps/Values"][: self.n_frames])
 
+    @cached_property
+    def frame_stages(self) -> Ints:
+        """Stages (from 0) that the frames belong to, shape (n_frames,)."""
+        return np.asarray(self._file["frames/stage"][: self.n_frames]).astype(np.int64)
+
     def frame(self, k: int) -> Any:
         """Frame k, counted from the end if negative: a StoredFrame, or a StoredIncrement in files over increments. Raises IndexError."""
         return self.increment(k) if self.axis == "increment" else self.instant(k)
