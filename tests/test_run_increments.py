@@ -130,9 +130,12 @@ def test_an_interrupt_leaves_a_file_that_says_so(stand: Stand, tmp_path: Path) -
         assert (results.stop_reason, results.series.rows) == ("interrupted", 10)
 
 
-def test_nothing_is_done_where_a_file_is_in_the_way(stand: Stand, tmp_path: Path) -> None:
+def test_nothing_is_done_where_a_file_is_in_the_way(
+    stand: Stand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Said at once, not after the packing."""
-    scenario = stand(states(), RunError("reached the engine"))
+    scenario = stand(states(), None)
+    monkeypatch.setattr(run, "build_assembly", lambda *_: pytest.fail("began to pack"))
     (tmp_path / "out.h5").write_text("mine")
     with pytest.raises(ResultsError, match="exists already"):
         run.run_scenario(scenario, tmp_path / "out.h5")
