@@ -49,7 +49,7 @@ def run_scenario(
     return target
 
 
-def assemble(scenario: Any, packing_listener: Callable[[str], None] | None) -> Assembly:
+def assemble(scenario: Scenario | QuasiStaticScenario, packing_listener: Callable[[str], None] | None) -> Assembly:
     """Grains and walls at the start of a scenario of any engine."""
     with marked_interrupts() as check:
 
@@ -94,9 +94,7 @@ def run_increments(
     scenario: QuasiStaticScenario, assembly: Assembly, target: Path, force: bool, listener: Listener | None
 ) -> None:
     """A quasi-static test: increments of the granular element engine. The file begins with the first, as the boundary's grains are in it."""
-    from dem_cli.engines.granular_element.engine import (  # type: ignore[import-not-found, import-untyped, unused-ignore]
-        GranularElementEngine,
-    )
+    from dem_cli.engines.granular_element.engine import GranularElementEngine
 
     engine = GranularElementEngine(scenario, assembly)
     tracks = scenario.output.tracks

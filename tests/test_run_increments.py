@@ -11,11 +11,12 @@ from types import ModuleType
 from typing import Any
 
 import few_grains
+import numpy as np
 import pytest
 from quasi_static_samples import DEPTH, KN, KT, lattice, resolved, shear_test
 
 from dem_cli import run
-from dem_cli.analysis.quasi_static import measure_increment
+from dem_cli.analysis.quasi_static import branch_stress, measure_increment
 from dem_cli.assembly import Assembly
 from dem_cli.cli import progress as progress_module
 from dem_cli.cli.progress import IncrementProgress, TimeProgress, clock, progress_of
@@ -130,9 +131,12 @@ def test_an_interrupt_leaves_a_file_that_says_so(stand: Stand, tmp_path: Path) -
         assert (results.stop_reason, results.series.rows) == ("interrupted", 10)
 
 
-def test_nothing_is_done_where_a_file_is_in_the_way(stand: Stand, tmp_path: Path) -> None:
+def test_nothing_is_done_where_a_file_is_in_the_way(
+    stand: Stand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Said at once, not after the packing."""
-    scenario = stand(states(), RunError("reached the engine"))
+    scenario = stand(states(), None)
+    monkeypatch.setattr(run, "build_assembly", lambda *_: pytest.fail("began to pack"))
     (tmp_path / "out.h5").write_text("mine")
     with pytest.raises(ResultsError, match="exists already"):
         run.run_scenario(scenario, tmp_path / "out.h5")
@@ -221,3 +225,40 @@ def test_pore_pressure_is_told_where_pores_are_closed() -> None:
 def test_the_kind_of_scenario_decides() -> None:
     assert isinstance(progress_of(parse_scenario(resolved(lattice()))), IncrementProgress)
     assert isinstance(progress_of(few_grains.scenario()), TimeProgress)
+
+
+REAL = """
+title = "a few discs"
+engine = "granular-element"
+seed = 3
+depth = "1 cm"
+grains = { shape = "disc", count = 16, radius = { uniform = ["3 mm", "5 mm"] }, density = "2500 kg/m^3" }
+material = { normal_stiffness = "1e5 N/m", tangential_stiffness = "0.7e5 N/m" }
+contact = { friction = "25 deg", wall_friction = "10 deg" }
+packing = { method = "overlapping" }
+stage = [
+    { kind = "compress", stress = "15 kPa" },
+    { kind = "shear", hold = "mean-stress", shear_strain = 0.003 },
+]
+"""
+
+
+def test_the_engine_itself_writes_samples_in_equilibrium(tmp_path: Path) -> None:
+    """Forces on each grain add up to nothing, shear forces and moments with them; the stress of the walls is that of
+    the branches.
+    """
+    scenario = parse_scenario(REAL)
+    assert isinstance(scenario, QuasiStaticScenario)
+    with open_results(run.run_scenario(scenario, tmp_path / "out.h5")) as results:
+        sheared = [one for one in map(results.increment, range(results.n_frames)) if one.stage == 1]
+        assert len(sheared) == 6
+        for one in sheared:
+            c, n = one.contacts, len(one.grains)
+            force = np.stack([c.normal * c.nx - c.shear * c.ny, c.normal * c.ny + c.shear * c.nx])
+            pairs = c.j >= 0
+            left = [np.bincount(c.j[pairs], f[pairs], n) - np.bincount(c.i, f, n) for f in force]
+            left.append(np.bincount(c.j[pairs], c.shear[pairs], n) + np.bincount(c.i, c.shear, n))
+            assert np.abs(left).max() < 1e-4 * c.normal.mean()
+            assert np.abs(c.shear).max() > 0.1 * c.normal.mean()
+            at_walls = (force * ~pairs) @ np.stack([c.px, c.py]).T / (one.area * scenario.depth)
+            np.testing.assert_allclose(branch_stress(one, scenario.depth), at_walls, atol=1e-4 * at_walls.max())

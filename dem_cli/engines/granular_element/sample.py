@@ -136,7 +136,7 @@ class Sample:
             "py": np.concatenate([place[:, 1], foot[:, 1]]),
             "overlap": np.concatenate([overlap, gap]),
             "normal": np.concatenate([near.normal[on], near.wall_normal[wall]]),
-            "shear": -np.concatenate([near.shear[on], near.wall_shear[wall]]),
+            "shear": np.concatenate([near.shear[on], near.wall_shear[wall]]),
             "sliding": np.concatenate([_at_limit(near.shear[on], limit), _at_limit(near.wall_shear[wall], wall_limit)]),
         }
         columns["stretch"] = -columns["shear"] / self.law.kt
