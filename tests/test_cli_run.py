@@ -53,7 +53,7 @@ def test_writes_the_file_and_tells_on_stderr(folder: Path) -> None:
     assert lines[0] == "a few grains fall: 10 grains, 2 stages, to few.h5"
     assert "stage 1/2 run: t = 0.05 s" in done.stderr
     assert "stage 2/2 more: t = 0.07 s" in done.stderr
-    assert any(re.fullmatch(r"done in \d+ s: few\.h5", line) for line in lines)
+    assert any(re.fullmatch(r"done in (\d+ min )?\d+ s: few\.h5", line) for line in lines)
     assert "dem report few.h5" in lines[-1]
     assert not re.search(r"[\x1b\r]", done.stderr)  # a log has neither colour nor bars
     assert sorted(path.name for path in folder.iterdir()) == ["few.h5", "few.toml"]

@@ -69,7 +69,7 @@ def test_cases_of_the_three_discs(case: int) -> None:
     compress, shear = s.stages
     assert isinstance(compress, Compress)
     assert isinstance(shear, Shear)
-    assert compress.stress == pytest.approx(1.5e6 * DYN_PER_CM2)
+    assert compress.stress == pytest.approx(1.5e5 * DYN_PER_CM2)
     assert (shear.hold, shear.shear_strain, shear.increment) == ("mean-stress", 0.05, 0.0005)
 
 

@@ -48,9 +48,9 @@ class Pace(NamedTuple):
     """How to iterate.
 
     momentum: the momentum iteration, else Kishino's; step: h, or alpha; cap: of the momentum; most: iterations; follow: the slider starts
-    anew from every iterate (as in the paper) and the ledger is kept iterate by iterate; accuracy [N]; stress: error of the servos over their
-    scale; far [m]: way from the anchor at which a grain that is held ends the attempt; patience: iterations in which the error must fall by half,
-    in square, or the momentum's cap is lowered; alpha_prime, beta, beta_prime: (10), (11).
+    anew from every iterate (as in the paper) and the ledger is kept iterate by iterate; accuracy [N]; stress: error of the servos over
+    their scale; far [m]: way from the anchor at which a grain that is held ends the attempt; patience: iterations in which the error must
+    fall by half, in square, or the momentum's cap is lowered; alpha_prime, beta, beta_prime: (10), (11).
     """
 
     momentum: bool
