@@ -18,9 +18,11 @@ from dem_cli.jit import kernel
 
 # free; moved with the box; of a membrane: free but not to turn, and, next to a wall, free along x only
 GRAIN, DRIVEN, MEMBRANE, TIED = 0, 1, 2, 3
-# Columns of the memory of a contact: shear and normal force where the slider starts from ("anchor"), the same at the start of the
+# Rows of the memory of a contact: shear and normal force where the slider starts from ("anchor"), the same at the start of the
 # sub-step, and the energy that sliding has cost in it [J].
 SHEAR, NORMAL, STEP_SHEAR, STEP_NORMAL, LOST, COLUMNS = 0, 1, 2, 3, 4, 5
+# Rows of the work of pairs: branch, sum of branches, relative turn, reach [m]; force [N].
+EX, EY, MX, MY, TURN, REACH, FX, FY, WORK = 0, 1, 2, 3, 4, 5, 6, 7, 8
 LEFT, RIGHT, BOTTOM, TOP = 0, 1, 2, 3
 # Sums over the boundary: force times arm about the centre along x and y [N m], their stiffness against strain [N m], force on both walls
 # across x and across y [N], smallest gap at these walls [m], contacts that opened or closed since the last look.
@@ -50,8 +52,9 @@ class Law(NamedTuple):
 class Near(NamedTuple):
     """Contacts that may come to touch while no disc moves more than half a skin, and their forces at the last look.
 
-    start, neighbour: half list; first, second (m,): the same as pairs; memory (m, COLUMNS); normal, shear [N], slip [m] (m,): what the
-    slider has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made.
+    start, neighbour: half list; first, second (m,): the same as pairs; memory (COLUMNS, m); normal, shear [N], slip [m] (m,): what the slider has
+    cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made; work
+    (WORK, m): room for numbers of each pair.
     """
 
     start: np.ndarray
@@ -70,15 +73,16 @@ class Near(NamedTuple):
     wall_slip: np.ndarray
     place: np.ndarray
     box: np.ndarray
+    work: np.ndarray
 
 
 @kernel()
 def no_list(n):
     """The list of n discs before the first look."""
-    ints, floats, memory = np.zeros(0, np.int32), np.zeros(0), np.zeros((0, COLUMNS))
+    ints, floats, memory = np.zeros(0, np.int32), np.zeros(0), np.zeros((COLUMNS, 0))
     return Near(
         np.zeros(n + 1, np.int64), ints, ints, ints, memory, floats, floats, floats, ints, ints, memory, floats, floats, floats,
-        np.full((n, 2), np.inf), np.zeros(4),
+        np.full((n, 2), np.inf), np.zeros(4), np.zeros((WORK, 0)),
     )  # fmt: skip
 
 
@@ -115,7 +119,7 @@ def renew(x, bodies, law, box, skin, old):
     for i in range(n):
         first[start[i] : start[i + 1]] = i
     carried = np.empty((old.first.size, COLUMNS + 1))
-    carried[:, :COLUMNS], carried[:, COLUMNS] = old.memory, old.normal
+    carried[:, :COLUMNS], carried[:, COLUMNS] = old.memory.T, old.normal
     carried = carry_memory(old.start, old.neighbour, carried, start, neighbour)
 
     disc, side = [np.int32(0) for _ in range(0)], [np.int32(0) for _ in range(0)]
@@ -136,11 +140,11 @@ def renew(x, bodies, law, box, skin, old):
         ):
             seen += 1
         if seen < old.disc.size and old.disc[seen] == disc[c] and old.side[seen] == side[c]:
-            memory[c, :COLUMNS], memory[c, COLUMNS] = old.wall_memory[seen], old.wall_normal[seen]
+            memory[c, :COLUMNS], memory[c, COLUMNS] = old.wall_memory[:, seen], old.wall_normal[seen]
     return Near(
-        start, neighbour, first, neighbour, carried[:, :COLUMNS].copy(), carried[:, COLUMNS].copy(), np.zeros(m), np.zeros(m),
-        discs, sides, memory[:, :COLUMNS].copy(), memory[:, COLUMNS].copy(), np.zeros(k), np.zeros(k),
-        x[:, :2].copy(), box.copy(),
+        start, neighbour, first, neighbour, carried[:, :COLUMNS].T.copy(), carried[:, COLUMNS].copy(), np.zeros(m), np.zeros(m),
+        discs, sides, memory[:, :COLUMNS].T.copy(), memory[:, COLUMNS].copy(), np.zeros(k), np.zeros(k),
+        x[:, :2].copy(), box.copy(), np.empty((WORK, m)),
     )  # fmt: skip
 
 
@@ -156,68 +160,88 @@ def is_stale(x, box, near, skin):
 
 
 @kernel()
-def forces(x, anchor, near, bodies, law, box, fixing, count, sums):
+def _gather(x, anchor, near, bodies):
+    """What the arithmetic of all pairs needs, side by side: branch, sum of the branches now and at the anchor, relative displacement and turn
+    since the anchor, reach.
+    """
+    start, work = near.start, near.work
+    for i in range(start.size - 1):
+        xi, yi, ri = x[i, 0], x[i, 1], bodies.radius[i]
+        ai, bi, qi = anchor[i, 0], anchor[i, 1], x[i, 2] - anchor[i, 2]
+        for c in range(start[i], start[i + 1]):
+            j = np.uint32(near.second[c])
+            ex, ey = x[j, 0] - xi, x[j, 1] - yi
+            fx, fy = anchor[j, 0] - ai, anchor[j, 1] - bi
+            work[EX, c], work[EY, c] = ex, ey
+            work[MX, c], work[MY, c] = ex + fx, ey + fy
+            work[TURN, c] = qi + (x[j, 2] - anchor[j, 2])
+            work[REACH, c] = ri + bodies.radius[j]
+
+
+@kernel()
+def _pair_law(ex, ey, mx, my, turn, reach, anchored, normal, shear, slip, fx, fy, kn, kt, mu, cohesion):
+    """Forces of all pairs from what was gathered, without a branch, so that several are done at once; returns how many opened or closed.
+
+    The way of i against j since the anchor is (branch at the anchor) - (branch now) = m - 2 e.
+    """
+    flips = 0
+    for c in range(ex.size):
+        distance = math.sqrt(ex[c] * ex[c] + ey[c] * ey[c])
+        p = kn * max(reach[c] - distance, 0.0)
+        nx, ny = ex[c] / distance, ey[c] / distance
+        along = 2.0 * (my[c] * ex[c] - mx[c] * ey[c]) / math.sqrt(mx[c] * mx[c] + my[c] * my[c]) + turn[c]
+        trial = anchored[c] + kt * along
+        touches = p > 0.0
+        limit = mu * p + cohesion if touches else 0.0
+        t = min(max(trial, -limit), limit)
+        flips += touches != (normal[c] > 0.0)
+        normal[c], shear[c] = p, t
+        slip[c] = (trial - t) / kt if touches else 0.0
+        fx[c], fy[c] = p * nx - t * ny, p * ny + t * nx
+    return flips
+
+
+@kernel()
+def forces(x, anchor, near, bodies, law, box, fixing, sums):
     """Fixing forces of all discs at x; the slider returns to its limit from the anchor.
 
     The normal force is kn times the overlap, a state; the tangential one starts from the memory and takes kt times the relative displacement
-    since the anchor (n, 3), along the tangent in the middle of the way. fixing (n, 3) [N], count (n,): contacts, sums (SUMS,): changed in place,
-    as are the forces in `near`.
+    since the anchor (n, 3), along the tangent in the middle of the way. fixing (n, 3) [N], sums (SUMS,) and the forces in `near`
+    change in place.
     """
-    n = bodies.radius.size
-    radius, memory = bodies.radius, near.memory
-    kn, kt, mu, cohesion = law.kn, law.kt, law.friction, law.cohesion
+    kn, kt = law.kn, law.kt
     sums[:] = 0.0
     sums[GAP_X] = sums[GAP_Y] = np.inf
-    for i in range(n):
-        fixing[i, 0] = fixing[i, 1] = fixing[i, 2] = 0.0
-        count[i] = 0
+    work = near.work
+    _gather(x, anchor, near, bodies)
+    flips = _pair_law(
+        work[EX], work[EY], work[MX], work[MY], work[TURN], work[REACH], near.memory[SHEAR], near.normal, near.shear, near.slip,
+        work[FX], work[FY], kn, kt, law.friction, law.cohesion,
+    )  # fmt: skip
+    fixing[:] = 0.0
     for i in range(bodies.grains):  # the load of membranes comes with their pressure
         fixing[i, 0], fixing[i, 1] = -bodies.load[i, 0], -bodies.load[i, 1]
-    flips = 0
-    for c in range(near.first.size):
-        i, j = near.first[c], near.second[c]
-        ex, ey, reach = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], radius[i] + radius[j]
-        square = ex * ex + ey * ey
-        if square >= reach * reach:
+    for i in range(near.start.size - 1):
+        sum_x = sum_y = sum_q = 0.0
+        for c in range(near.start[i], near.start[i + 1]):
             if near.normal[c] > 0.0:
-                flips += 1
-            near.normal[c] = near.shear[c] = near.slip[c] = 0.0
-            continue
-        if near.normal[c] == 0.0:
-            flips += 1
-        distance = math.sqrt(square)
-        p = kn * (reach - distance)
-        nx, ny = ex / distance, ey / distance
-        mx, my = ex + anchor[j, 0] - anchor[i, 0], ey + anchor[j, 1] - anchor[i, 1]
-        ux = (x[i, 0] - anchor[i, 0]) - (x[j, 0] - anchor[j, 0])
-        uy = (x[i, 1] - anchor[i, 1]) - (x[j, 1] - anchor[j, 1])
-        turn = (x[i, 2] - anchor[i, 2]) + (x[j, 2] - anchor[j, 2])
-        trial = memory[c, SHEAR] + kt * ((mx * uy - my * ux) / math.sqrt(mx * mx + my * my) + turn)
-        limit = mu * p + cohesion
-        t = min(max(trial, -limit), limit)
-        near.normal[c], near.shear[c], near.slip[c] = p, t, (trial - t) / kt
-        fx, fy = p * nx - t * ny, p * ny + t * nx
-        fixing[i, 0] += fx
-        fixing[i, 1] += fy
-        fixing[i, 2] += t
-        fixing[j, 0] -= fx
-        fixing[j, 1] -= fy
-        fixing[j, 2] += t
-        count[i] += 1
-        count[j] += 1
-        if j >= bodies.grains:
-            ax, ay = (
-                x[i, 0] + nx * (radius[i] - 0.5 * p / kn) - box[0],
-                x[i, 1] + ny * (radius[i] - 0.5 * p / kn) - box[1],
-            )
-            sums[XX] += fx * ax
-            sums[YY] += fy * ay
-            sums[STIFF_X] += (kn * nx * nx + kt * ny * ny) * ax * ax
-            sums[STIFF_Y] += (kn * ny * ny + kt * nx * nx) * ay * ay
+                j = np.uint32(near.second[c])
+                fx, fy, t = work[FX, c], work[FY, c], near.shear[c]
+                sum_x += fx
+                sum_y += fy
+                sum_q += t
+                fixing[j, 0] -= fx
+                fixing[j, 1] -= fy
+                fixing[j, 2] += t
+        fixing[i, 0] += sum_x
+        fixing[i, 1] += sum_y
+        fixing[i, 2] += sum_q
+    if bodies.grains < bodies.radius.size:
+        _sum_over_chain(x, near, bodies, law, box, sums)
     for c in range(near.disc.size):
         i, side = near.disc[c], near.side[c]
         nx, ny, place = wall_of(side, box)
-        overlap = nx * x[i, 0] + ny * x[i, 1] + radius[i] - place
+        overlap = nx * x[i, 0] + ny * x[i, 1] + bodies.radius[i] - place
         if overlap <= 0.0:
             if near.wall_normal[c] > 0.0:
                 flips += 1
@@ -229,19 +253,48 @@ def forces(x, anchor, near, bodies, law, box, fixing, count, sums):
             flips += 1
         p = kn * overlap
         along = (x[i, 1] - anchor[i, 1]) * nx - (x[i, 0] - anchor[i, 0]) * ny + (x[i, 2] - anchor[i, 2])
-        trial = near.wall_memory[c, SHEAR] + kt * along
+        trial = near.wall_memory[SHEAR, c] + kt * along
         limit = law.wall_friction[side] * p
         t = min(max(trial, -limit), limit)
         near.wall_normal[c], near.wall_shear[c], near.wall_slip[c] = p, t, (trial - t) / kt
         fixing[i, 0] += p * nx - t * ny
         fixing[i, 1] += p * ny + t * nx
         fixing[i, 2] += t
-        count[i] += 1
         arm = box[2] if side <= RIGHT else box[3]
         sums[WALL_X if side <= RIGHT else WALL_Y] += p
         sums[XX if side <= RIGHT else YY] += p * arm
         sums[STIFF_X if side <= RIGHT else STIFF_Y] += kn * arm * arm
     sums[FLIPS] = flips
+
+
+@kernel()
+def _sum_over_chain(x, near, bodies, law, box, sums):
+    """Adds the contacts of grains with boundary grains to the sums over the boundary."""
+    for c in range(near.second.size):
+        j = near.second[c]
+        if near.normal[c] > 0.0 and j >= bodies.grains:
+            i = near.first[c]
+            ex, ey = near.work[EX, c], near.work[EY, c]
+            distance = math.sqrt(ex * ex + ey * ey)
+            nx, ny, arm = ex / distance, ey / distance, bodies.radius[i] - 0.5 * near.normal[c] / law.kn
+            ax, ay = x[i, 0] + nx * arm - box[0], x[i, 1] + ny * arm - box[1]
+            sums[XX] += near.work[FX, c] * ax
+            sums[YY] += near.work[FY, c] * ay
+            sums[STIFF_X] += (law.kn * nx * nx + law.kt * ny * ny) * ax * ax
+            sums[STIFF_Y] += (law.kn * ny * ny + law.kt * nx * nx) * ay * ay
+
+
+@kernel()
+def count_contacts(near, touching):
+    """Number of contacts that carry force on each disc, touching (n,), overwritten."""
+    touching[:] = 0
+    for c in range(near.first.size):
+        if near.normal[c] > 0.0:
+            touching[near.first[c]] += 1
+            touching[near.second[c]] += 1
+    for c in range(near.disc.size):
+        if near.wall_normal[c] > 0.0:
+            touching[near.disc[c]] += 1
 
 
 @kernel(inline=True)
@@ -283,33 +336,33 @@ def contact_stiffness(x, near, law, box, stiffness, last):
 def set_anchor(x, anchor, near):
     """The slider starts from here."""
     anchor[:] = x
-    near.memory[:, SHEAR], near.memory[:, NORMAL] = near.shear, near.normal
-    near.wall_memory[:, SHEAR], near.wall_memory[:, NORMAL] = near.wall_shear, near.wall_normal
+    near.memory[SHEAR], near.memory[NORMAL] = near.shear, near.normal
+    near.wall_memory[SHEAR], near.wall_memory[NORMAL] = near.wall_shear, near.wall_normal
 
 
 @kernel()
 def begin_step(near):
     """A sub-step starts from here: forces are kept, and nothing has been lost yet."""
-    near.memory[:, STEP_SHEAR], near.memory[:, STEP_NORMAL], near.memory[:, LOST] = near.shear, near.normal, 0.0
-    near.wall_memory[:, STEP_SHEAR], near.wall_memory[:, STEP_NORMAL] = near.wall_shear, near.wall_normal
-    near.wall_memory[:, LOST] = 0.0
+    near.memory[STEP_SHEAR], near.memory[STEP_NORMAL], near.memory[LOST] = near.shear, near.normal, 0.0
+    near.wall_memory[STEP_SHEAR], near.wall_memory[STEP_NORMAL] = near.wall_shear, near.wall_normal
+    near.wall_memory[LOST] = 0.0
 
 
 @kernel()
 def lose(near):
     """Adds to LOST what sliding since the anchor has cost: mean shear force times slip, where there was force at both ends (28)."""
     for c in range(near.first.size):
-        if near.slip[c] != 0.0 and near.memory[c, NORMAL] > 0.0:
-            near.memory[c, LOST] += 0.5 * (near.memory[c, SHEAR] + near.shear[c]) * near.slip[c]
+        if near.slip[c] != 0.0 and near.memory[NORMAL, c] > 0.0:
+            near.memory[LOST, c] += 0.5 * (near.memory[SHEAR, c] + near.shear[c]) * near.slip[c]
     for c in range(near.disc.size):
-        if near.wall_slip[c] != 0.0 and near.wall_memory[c, NORMAL] > 0.0:
-            near.wall_memory[c, LOST] += 0.5 * (near.wall_memory[c, SHEAR] + near.wall_shear[c]) * near.wall_slip[c]
+        if near.wall_slip[c] != 0.0 and near.wall_memory[NORMAL, c] > 0.0:
+            near.wall_memory[LOST, c] += 0.5 * (near.wall_memory[SHEAR, c] + near.wall_shear[c]) * near.wall_slip[c]
 
 
 @kernel()
 def lost_so_far(near):
     """Sum of LOST [J]."""
-    return near.memory[:, LOST].sum() + near.wall_memory[:, LOST].sum()
+    return near.memory[LOST].sum() + near.wall_memory[LOST].sum()
 
 
 @kernel()
@@ -317,28 +370,28 @@ def lose_in_step(x, began, near, law):
     """LOST of a whole sub-step by (25)-(28), from its start at `began` (n, 3): for a slider that was moved on in between."""
     for c in range(near.first.size):
         i, j = near.first[c], near.second[c]
-        near.memory[c, LOST] = 0.0
-        if near.normal[c] > 0.0 and near.memory[c, STEP_NORMAL] > 0.0:
+        near.memory[LOST, c] = 0.0
+        if near.normal[c] > 0.0 and near.memory[STEP_NORMAL, c] > 0.0:
             mx = x[j, 0] - x[i, 0] + began[j, 0] - began[i, 0]
             my = x[j, 1] - x[i, 1] + began[j, 1] - began[i, 1]
             ux = (x[i, 0] - began[i, 0]) - (x[j, 0] - began[j, 0])
             uy = (x[i, 1] - began[i, 1]) - (x[j, 1] - began[j, 1])
             turn = (x[i, 2] - began[i, 2]) + (x[j, 2] - began[j, 2])
             along = (mx * uy - my * ux) / math.sqrt(mx * mx + my * my) + turn
-            old, new = near.memory[c, STEP_SHEAR], near.shear[c]
-            near.memory[c, LOST] = 0.5 * (old + new) * (along - (new - old) / law.kt)
+            old, new = near.memory[STEP_SHEAR, c], near.shear[c]
+            near.memory[LOST, c] = 0.5 * (old + new) * (along - (new - old) / law.kt)
     for c in range(near.disc.size):
         i = near.disc[c]
-        near.wall_memory[c, LOST] = 0.0
-        if near.wall_normal[c] > 0.0 and near.wall_memory[c, STEP_NORMAL] > 0.0:
+        near.wall_memory[LOST, c] = 0.0
+        if near.wall_normal[c] > 0.0 and near.wall_memory[STEP_NORMAL, c] > 0.0:
             nx, ny = 0.0, 0.0
             if near.side[c] <= RIGHT:
                 nx = 1.0 if near.side[c] == RIGHT else -1.0
             else:
                 ny = 1.0 if near.side[c] == TOP else -1.0
             along = (x[i, 1] - began[i, 1]) * nx - (x[i, 0] - began[i, 0]) * ny + x[i, 2] - began[i, 2]
-            old, new = near.wall_memory[c, STEP_SHEAR], near.wall_shear[c]
-            near.wall_memory[c, LOST] = 0.5 * (old + new) * (along - (new - old) / law.kt)
+            old, new = near.wall_memory[STEP_SHEAR, c], near.wall_shear[c]
+            near.wall_memory[LOST, c] = 0.5 * (old + new) * (along - (new - old) / law.kt)
 
 
 @kernel()

@@ -28,6 +28,7 @@ from dem_cli.engines.granular_element.contacts import (
     SUMS,
     TIED,
     contact_stiffness,
+    count_contacts,
     forces,
     is_stale,
     lose,
@@ -41,6 +42,7 @@ BALANCED, UNBALANCED, NOT_A_NUMBER, AWAY = 0, 1, 2, 3
 WALL_STEP = 0.3  # share of a servo's error that a momentum step takes
 FIRM, LOOSE = 0.1, 1.0  # added to the blocks, in units of kn, for discs with two contacts and more, and with less
 LOOK = 50  # iterations between two looks at how far discs have moved
+SOON = 4  # iterations after which blocks are made anew where contacts opened or closed
 REFRESH = 20  # iterations after which blocks are made anew though no contact opened or closed
 
 
@@ -68,11 +70,14 @@ class Pace(NamedTuple):
 
 
 class Iterates(NamedTuple):
-    """Work arrays: velocity, fixing, old fixing (n, 3), inverse blocks (n, 6), last normals (n, 2), contacts (n,), old load (n, 2)."""
+    """Work arrays: velocity, fixing, old fixing (n, 3), blocks and their inverses (n, 6), normals of the last contacts (n, 2), number of
+    contacts (n,), old load (n, 2).
+    """
 
     velocity: np.ndarray
     fixing: np.ndarray
     old_fixing: np.ndarray
+    blocks: np.ndarray
     inverse: np.ndarray
     last: np.ndarray
     touching: np.ndarray
@@ -82,20 +87,21 @@ class Iterates(NamedTuple):
 @kernel()
 def room_for(n):
     return Iterates(
-        np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 6)), np.zeros((n, 2)), np.zeros(n, np.int64), np.zeros((n, 2))
+        np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 2)),
+        np.zeros(n, np.int64), np.zeros((n, 2)),
     )  # fmt: skip
 
 
 @kernel()
 def look(x, anchor, near, bodies, law, chain, box, depth, room, sums):
     """Fixing forces at x, membranes included; returns the energy of the membranes' links [J]."""
-    forces(x, anchor, near, bodies, law, box, room.fixing, room.touching, sums)
+    forces(x, anchor, near, bodies, law, box, room.fixing, sums)
     return membrane_forces(x, bodies, chain, depth, room.fixing) if chain.ring.size > 0 else 0.0
 
 
 @kernel()
 def _invert(block, add, turns, out):
-    """Inverse of a symmetric block (xx, xy, xq, yy, yq, qq) with `add` on its diagonal, or of its part that does not turn. False if singular."""
+    """Inverse of a symmetric block (xx, xy, xq, yy, yq, qq) with `add` on its diagonal, or of its part that does not turn; 0 if singular."""
     a, b, c = block[0] + add, block[1], block[2]
     d, e, g = block[3] + add, block[4], block[5] + add
     out[:] = 0.0
@@ -103,20 +109,19 @@ def _invert(block, add, turns, out):
         aa, bb, cc = d * g - e * e, c * e - b * g, b * e - c * d
         det = a * aa + b * bb + c * cc
         if det > 1e-9 * (a + d) ** 3:
-            out[0], out[1], out[2] = aa / det, bb / det, cc / det
-            out[3], out[4], out[5] = (a * g - c * c) / det, (b * c - a * e) / det, (a * d - b * b) / det
-            return True
+            scale = 1.0 / det
+            out[0], out[1], out[2] = aa * scale, bb * scale, cc * scale
+            out[3], out[4], out[5] = (a * g - c * c) * scale, (b * c - a * e) * scale, (a * d - b * b) * scale
+            return
     det = a * d - b * b
     if det > 1e-9 * (a + d) ** 2:
         out[0], out[1], out[3] = d / det, -b / det, a / det
-        return True
-    return False
 
 
 @kernel()
 def _blocks(x, near, bodies, law, chain, box, room, momentum):
     """Inverse blocks of all discs; those that cannot be inverted (12) are zero."""
-    blocks = np.empty((x.shape[0], 6))
+    blocks = room.blocks
     contact_stiffness(x, near, law, box, blocks, room.last)
     if chain.ring.size > 0:
         membrane_stiffness(x, bodies, chain, blocks)
@@ -233,7 +238,7 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
     sums, old_sums, old_box, before = np.zeros(SUMS), np.zeros(SUMS), box.copy(), x.copy()
     error, push, speed = np.zeros(MOST_SERVOS), np.zeros(MOST_SERVOS), np.zeros(MOST_SERVOS)
     age, since, worst, which, stress = 0, REFRESH, 0.0, -1, 0.0
-    cap, best, waited = pace.cap, np.inf, 0
+    cap, best, waited, flips = pace.cap, np.inf, 0, 0.0
     for iteration in range(-1 if pace.follow else 0, pace.most + 1):
         if iteration == 0:
             _strain(x, box, goal, guess, bodies, chain, pace.momentum)
@@ -268,9 +273,11 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
         if iteration % LOOK == 0 and not pace.follow and _moved(x, anchor, bodies, room) > pace.far:
             return near, AWAY, iteration, math.sqrt(worst), which, stress
         since += 1
-        if since > REFRESH or sums[FLIPS] > 0.0:
+        flips += sums[FLIPS]
+        if since > REFRESH or (flips > 0.0 and since > SOON):
+            count_contacts(near, room.touching)
             _blocks(x, near, bodies, law, chain, box, room, pace.momentum)
-            since = 0
+            since, flips = 0, 0.0
         momentum = 0.0
         if pace.momentum:
             power = 0.0

@@ -17,6 +17,7 @@ from dem_cli.engines.granular_element.contacts import (
     Law,
     Near,
     begin_step,
+    count_contacts,
     no_list,
     renew,
     set_anchor,
@@ -90,6 +91,7 @@ class Sample:
         links = look(
             self.x, self.anchor, self.near, self.bodies, self.law, self.chain, self.box, self.depth, room, sums
         )
+        count_contacts(self.near, room.touching)
         return View(room, sums, np.array([*stored(self.near, self.law), links]))
 
     def with_friction(self, friction: float, cohesion: float | None = None) -> None:

@@ -222,7 +222,7 @@ def _settle_up(before: Sample, sample: Sample, start: View, end: View, done: Don
             sample.box, before.box, ledger,
         )  # fmt: skip
     near = sample.near
-    lost = np.concatenate([near.memory[:, LOST], near.wall_memory[:, LOST]])
+    lost = np.concatenate([near.memory[LOST], near.wall_memory[LOST]])
     first = np.concatenate([near.first, near.disc]).astype(np.int64)
     numbers = np.cumsum(sample.law.wall)[near.side] - 1
     second = np.concatenate([near.second, -1 - numbers]).astype(np.int64)
