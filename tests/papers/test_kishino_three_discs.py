@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granular_samples import shipped, three_discs
+from granular_samples import pairs, shipped, three_discs
 from scipy.optimize import brentq
 
 from dem_cli.state import Increment
@@ -86,14 +86,18 @@ def test_table_2_by_the_papers_solver(case: str) -> None:
 
 @pytest.mark.parametrize("case", ["case2", "case4"])
 def test_no_sliding_and_few_iterations(case: str) -> None:
-    """Smooth walls let the discs turn as they like: nothing slides, no energy is lost; at most 60 iterations a step, no fallback."""
+    """Smooth walls let the discs turn as they like: nothing slides, no energy is lost; at most 60 iterations a step, no fallback.
+
+    Save in the first increment of case 4: that is thirty overlaps, in which the lower contact opens, and followed as a collapse.
+    """
     found = shear(three_discs(*CASES[case]))
-    assert found[-1].energy.friction == found[0].energy.friction == 0.0
-    for one in found[1:]:
-        assert one.iterations <= 60 * one.sub_steps
-        assert one.rung == 0
-        assert not one.event
-        assert not np.any(one.contacts.shear)
+    for one, next_one in pairs(found):
+        assert next_one.iterations <= 60 * next_one.sub_steps
+        assert not np.any(np.abs(next_one.contacts.shear) > 1e-5)  # the accuracy, N
+        if case == "case2" or one.in_stage > 0:
+            assert next_one.energy.friction == one.energy.friction
+            assert next_one.rung == 0
+            assert not next_one.event
 
 
 def test_mean_stress_and_symmetry() -> None:
@@ -108,8 +112,9 @@ def test_mean_stress_and_symmetry() -> None:
 def test_walls_with_friction() -> None:
     """Fig. 7: the ratio is largest where the lower discs part, later and higher than between smooth walls, and falls from there on."""
     peaks = []
-    for angle in (5, 10):
-        found = shear(shipped("biaxial-three-discs-wall-friction", f"contact.wall_friction={angle} deg"))
+    for angle, reach in ((5, 0.02), (10, 0.04)):
+        changes = (f"contact.wall_friction={angle} deg", f"stage.shear.shear_strain={reach}")
+        found = shear(shipped("biaxial-three-discs-wall-friction", *changes))
         ratio = [float((one.stress[1] - one.stress[0]) / one.stress.sum()) for one in found]
         top = int(np.argmax(ratio))
         touch = [bool(np.any((one.contacts.i == 0) & (one.contacts.j == 1))) for one in found]
