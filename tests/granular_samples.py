@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -79,7 +80,8 @@ def cluster(seed: int, n: int = 12, overlap: float = 0.02) -> Floats:
 def scenario(changes: dict[str, Any] | None = None) -> QuasiStaticScenario:
     """24 discs, compressed with less friction than they are sheared with, then 5 increments of shear; keys changed as in `quick`."""
     short = {"kind": "shear", "hold": "mean-stress", "shear_strain": 0.0025}
-    made = parse_scenario(quick({"grains.count": 24, "stage": [COMPRESS, short], **(changes or {})}))
+    given = copy.deepcopy({"grains.count": 24, "stage": [COMPRESS, short], **(changes or {})})  # keys are set within stages
+    made = parse_scenario(quick(given))
     assert isinstance(made, QuasiStaticScenario)
     return made
 
