@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,9 @@ def cluster(seed: int, n: int = 12, overlap: float = 0.02) -> Floats:
 def scenario(changes: dict[str, Any] | None = None) -> QuasiStaticScenario:
     """24 discs, compressed with less friction than they are sheared with, then 5 increments of shear; keys changed as in `quick`."""
     short = {"kind": "shear", "hold": "mean-stress", "shear_strain": 0.0025}
-    given = copy.deepcopy({"grains.count": 24, "stage": [COMPRESS, short], **(changes or {})})  # keys are set within stages
+    given = copy.deepcopy(
+        {"grains.count": 24, "stage": [COMPRESS, short], **(changes or {})}
+    )  # keys are set within stages
     made = parse_scenario(quick(given))
     assert isinstance(made, QuasiStaticScenario)
     return made
@@ -137,4 +140,4 @@ def turned(assembly: Assembly) -> Assembly:
 
 def pairs(increments: list[Increment]) -> Iterator[tuple[Increment, Increment]]:
     """Each increment of one stage with the one before it."""
-    yield from zip(increments, increments[1:], strict=False)
+    yield from pairwise(increments)

@@ -218,7 +218,7 @@ def test_servo_errors() -> None:
     sample.look()
     kn, r, error, push = KN, RADIUS, np.zeros(2), np.zeros(2)
     now = sample.stress(sample.look())
-    target = now + [50.0, -70.0]
+    target = now + np.array([50.0, -70.0])
     both = servos([(1.0, 0.0), (0.0, 1.0)], [(1.0, 0.0), (0.0, 1.0)], target.tolist(), 100.0)
     worst = servo_errors(both, sample.look().sums, sample.area, DEPTH, sample.box, kn, r, error, push)
     assert worst == pytest.approx(0.7, rel=1e-9)

@@ -60,7 +60,11 @@ def test_contact_stiffness_is_the_change_of_the_fixing_force(rough: float) -> No
     corner = RADIUS - overlap - 1.0
     places = corner + np.array([(0.0, 0.0), (d, 0.0), (0.5 * d, math.sqrt(0.75) * d)])
     sample = few(places, friction=50.0, wall_friction=[rough] * 4)
-    assert sample.look().room.touching.tolist() == [4, 3, 2]  # the lower ones also touch the floor, the first one the wall left
+    assert sample.look().room.touching.tolist() == [
+        4,
+        3,
+        2,
+    ]  # the lower ones also touch the floor, the first one the wall left
     blocks, step = stiffness_of(sample), 0.01 * overlap
     for i in range(3):
         measured = np.empty((3, 3))
@@ -281,9 +285,7 @@ def test_what_sliding_along_a_wall_costs(side: int) -> None:
 @given(SEEDS)
 def test_a_new_list_changes_no_force(seed: int) -> None:
     """Sliders keep what they have, found or not by both lists; discs at walls too."""
-    sample = few(
-        cluster(seed), (4.0 * RADIUS, 2.75 * RADIUS), friction=0.4, wall_friction=[0.3] * 4
-    )
+    sample = few(cluster(seed), (4.0 * RADIUS, 2.75 * RADIUS), friction=0.4, wall_friction=[0.3] * 4)
     rng = np.random.default_rng(seed)
     sample.x += rng.uniform(-0.01, 0.01, sample.x.shape) * RADIUS
     sample.look()

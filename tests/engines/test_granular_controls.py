@@ -64,7 +64,7 @@ def test_friction_while_compressing_is_left_behind() -> None:
 @pytest.mark.parametrize("axial", ["x", "y"])
 @pytest.mark.parametrize("hold", ["mean-stress", "lateral-stress", "volume", "lateral-strain"])
 def test_what_is_held(hold: str, axial: str) -> None:
-    """To the tolerance in every increment; the shear strain grows by 0.0005 each and ends where asked, the sample is compressed along `axial`."""
+    """To the tolerance each time; the shear strain grows by 0.0005 each and ends where asked, the sample is compressed along `axial`."""
     found = last_stage({**TEST, "hold": hold, "axial": axial, "shear_strain": 0.0022})
     assert len(found) == 6
     along, across = (0, 1) if axial == "x" else (1, 0)
@@ -102,7 +102,9 @@ def test_pore_pressure(total: str, axial: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "limit", [{"stress_ratio": 0.2}, {"stress": "2.5 kPa"}, {"strain": 0.00053}], ids=["stress ratio", "stress", "strain"]
+    "limit",
+    [{"stress_ratio": 0.2}, {"stress": "2.5 kPa"}, {"strain": 0.00053}],
+    ids=["stress ratio", "stress", "strain"],
 )
 @pytest.mark.parametrize("axial", ["x", "y"])
 def test_cycles_turn_at_their_limits(limit: dict[str, Any], axial: str) -> None:
@@ -131,7 +133,14 @@ def test_half_cycles_end_at_the_largest_strain() -> None:
 
 def test_liquefied() -> None:
     """At constant volume a sample that loses 2 % of its stress is told to have liquefied, and in which cycle."""
-    stage = {**CYCLES, "hold": "volume", "limit": {"strain": 0.001}, "cycles": 5, "increment": 0.0005, "liquefied": 0.981}
+    stage = {
+        **CYCLES,
+        "hold": "volume",
+        "limit": {"strain": 0.001},
+        "cycles": 5,
+        "increment": 0.0005,
+        "liquefied": 0.981,
+    }
     found = last_stage(stage, **{"stage.0.friction": "25 deg", "seed": 1})
     share = [one.stress.mean() / found[0].stress.mean() for one in found]
     assert share[-1] < 0.981

@@ -50,7 +50,9 @@ def test_a_heavy_disc_falls_and_rests(momentum: bool) -> None:
     """(13): without contact along the body force; on the floor it bears its weight; the whole way down is body work, released."""
     sample = few([(0.0, 0.5 * RADIUS)], (3.0 * RADIUS, 3.0 * RADIUS), load=(0.0, -0.5))
     solver = Solver(momentum=momentum, accuracy=1e-6, stress=1e-6)
-    done = collapse_step(sample, sample.box[2:].copy(), no_servos(), solver, [solver.pace(1, 0.75, 0.0, 20000, follow=True)])
+    done = collapse_step(
+        sample, sample.box[2:].copy(), no_servos(), solver, [solver.pace(1, 0.75, 0.0, 20000, follow=True)]
+    )
     assert done.balanced
     assert sample.near.wall_normal.sum() == pytest.approx(0.5, rel=1e-5)
     assert sample.x[0, 0] == 0.0
@@ -63,7 +65,13 @@ def test_a_heavy_disc_falls_and_rests(momentum: bool) -> None:
 def test_rolling_down_to_rest() -> None:
     """(11): a heavy disc on one other rolls over it without sliding, and comes to rest beside it; the lower one cannot move."""
     lower = (0.0, -2.0 * RADIUS)
-    sample = few([(0.2 * RADIUS, -0.021 * RADIUS), lower], (3.0 * RADIUS, 3.0 * RADIUS), friction=5.0, wall_friction=[5.0] * 4, load=(0.0, -0.5))
+    sample = few(
+        [(0.2 * RADIUS, -0.021 * RADIUS), lower],
+        (3.0 * RADIUS, 3.0 * RADIUS),
+        friction=5.0,
+        wall_friction=[5.0] * 4,
+        load=(0.0, -0.5),
+    )
     sample.bodies.load[1] = 0.0
     solver = Solver(momentum=False, accuracy=1e-4, stress=1e-6, most=20_000)
     before = sample.x.copy()
@@ -78,7 +86,7 @@ def test_rolling_down_to_rest() -> None:
 
 @BOTH
 def test_stress_above_and_strain_aside(momentum: bool) -> None:
-    """Two smooth discs between four walls, the line of centres at 50 degrees, 15 kPa held on bottom and top: every force follows from statics."""
+    """Two smooth discs between four walls, the line of centres at 50 degrees, 15 kPa held above: every force follows from statics."""
     angle = np.radians(50.0)
     half = RADIUS * np.array([1.0 + np.cos(angle), 1.0 + np.sin(angle)])
     places = RADIUS * np.array([(-np.cos(angle), -np.sin(angle)), (np.cos(angle), np.sin(angle))])
