@@ -2,7 +2,7 @@
 
 Samples of the paper's grading, `biaxial-kishino` with more discs, are compressed once by the momentum iteration; from there both solvers shear
 them at constant mean stress in increments of 0.05 %, each as it is by default (momentum in four sub-steps, to 1e-5 of stress x diameter x
-depth; the paper's in one, to its 100 dyn). Printed of each are seconds of one core, also scaled to 60 increments where fewer are done, iterations
+depth; the paper's in one, to its 100 dyn). Printed of each are CPU seconds, also scaled to 60 increments where fewer are done, iterations
 of a sub-step (median over the increments), increments that passed through a collapse or were left out of balance, and the bytes a disc that the
 sample takes (discs, contacts nearby, work arrays of an iteration; a sub-step keeps one copy of the discs and contacts beside it). By hand:
 
