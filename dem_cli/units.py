@@ -117,6 +117,15 @@ def write(value: float, unit: str) -> str:
     return f"{value!r} {unit}"
 
 
+def human(value: float, unit: str, digits: int = 4) -> str:
+    """A value with a prefix that suits its size: 0.005 m is 5 mm."""
+    if unit in ("m", "s", "B", "Pa"):
+        for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6)):
+            if abs(value) >= factor and (unit in ("B", "Pa") or factor <= 1.0):
+                return f"{float(f'{value / factor:.{digits}g}'):g} {prefix}{unit}"
+    return f"{value:.{digits}g} {unit}"
+
+
 def dimension(unit: str) -> str:
     """The name of what `unit` measures, for example "length"."""
     return KINDS[unit][0]

@@ -15,12 +15,13 @@ from click.testing import CliRunner, Result
 from scenario_text import ABSENT, small
 
 from dem_cli.cli import main
-from dem_cli.cli.check import clock, counted, human
+from dem_cli.cli.check import clock, counted
 from dem_cli.cli.derived import derive, file_bytes
 from dem_cli.engines.explicit.timestep import critical_time_step, disc_modes, thesis_time_step
 from dem_cli.results.writer import ResultWriter
 from dem_cli.scenario import parse_scenario
 from dem_cli.state import Contacts, Energy, Frame, Grains, Walls
+from dem_cli.units import human
 
 ROOT = Path(__file__).parent.parent
 THESIS = str(ROOT / "scenarios" / "thesis-discs-400gal-10hz.toml")

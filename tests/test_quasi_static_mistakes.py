@@ -170,12 +170,17 @@ ONE_LINE: list[tuple[dict[str, Any], str]] = [
     ),
     # a membrane gives pressure on the sides
     (
-        {**MEMBRANE, "stage": [COMPRESS, {**SHEAR, "axial": "x"}]},
+        {**MEMBRANE, "stage": [COMPRESS, {**SHEAR, "hold": "lateral-stress", "axial": "x"}]},
         '[[stage]] 2 (shear) axial = "x": contradicts boundary.kind = membrane',
     ),
     (
         {**MEMBRANE, "stage": [COMPRESS, CYCLIC]},
         '[[stage]] 2 (cyclic) hold = "volume": contradicts boundary.kind = membrane',
+    ),
+    (
+        {**MEMBRANE, "stage": [COMPRESS, SHEAR]},
+        '[[stage]] 2 (shear) hold = "mean-stress": contradicts boundary.kind = membrane, which holds its pressure on the sides and nothing '
+        'else. Write hold = "lateral-stress", or take boundary.kind = "walls" or "chain"',
     ),
     (
         {**MEMBRANE, "stage": [{**LOAD, "x": {"strain": 0.1}}]},

@@ -13,11 +13,13 @@ from typing import Any
 import few_grains
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from quasi_static_samples import DEPTH, KN, KT, lattice, resolved, shear_test
 
 from dem_cli import run
 from dem_cli.analysis.quasi_static import branch_stress, measure_increment
 from dem_cli.assembly import Assembly
+from dem_cli.cli import main
 from dem_cli.cli import progress as progress_module
 from dem_cli.cli.progress import IncrementProgress, TimeProgress, clock, progress_of
 from dem_cli.errors import ResultsError, RunError
@@ -100,6 +102,16 @@ def test_all_increments_reach_the_file(stand: Stand, tmp_path: Path) -> None:
         dissipation = results.dissipation
         assert dissipation is not None
         assert len(dissipation.energy) == len(given)
+
+
+def test_run_prints_the_report_of_a_shear_test(stand: Stand, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = states()
+    monkeypatch.chdir(tmp_path)
+    Path("one.toml").write_text(stand(given, None).source)
+    done = CliRunner().invoke(main, ["run", "one.toml", "--report"])
+    assert done.exit_code == 0, done.output
+    assert "peak of s1/s2" in done.stdout
+    assert done.stdout == CliRunner().invoke(main, ["report", "one.h5"]).stdout
 
 
 def test_the_file_begins_with_the_grains_of_the_boundary(stand: Stand, tmp_path: Path) -> None:
@@ -250,6 +262,7 @@ def test_the_engine_itself_writes_samples_in_equilibrium(tmp_path: Path) -> None
     scenario = parse_scenario(REAL)
     assert isinstance(scenario, QuasiStaticScenario)
     with open_results(run.run_scenario(scenario, tmp_path / "out.h5")) as results:
+        assert [stage.reason for stage in results.stages] == ["15 kPa all round", "shear strain of 0.3 % reached"]
         sheared = [one for one in map(results.increment, range(results.n_frames)) if one.stage == 1]
         assert len(sheared) == 6
         for one in sheared:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from dem_cli.units import human
+
 if TYPE_CHECKING:
     from dem_cli.cli.derived import Derived
     from dem_cli.cli.derived_quasi_static import DerivedQuasiStatic
@@ -202,15 +204,6 @@ def about_record(motion: dict[str, Any]) -> list[tuple[str, str]]:
 def scientific(values: tuple[float, float, float], unit: str) -> str:
     """Smallest and largest with exponents."""
     return f"{values[0]:.3e} {unit}" if values[0] == values[2] else f"from {values[0]:.3e} to {values[2]:.3e} {unit}"
-
-
-def human(value: float, unit: str, digits: int = 4) -> str:
-    """A value with a prefix that suits its size: 0.005 m is 5 mm."""
-    if unit in ("m", "s", "B", "Pa"):
-        for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("µ", 1e-6)):
-            if abs(value) >= factor and (unit in ("B", "Pa") or factor <= 1.0):
-                return f"{float(f'{value / factor:.{digits}g}'):g} {prefix}{unit}"
-    return f"{value:.{digits}g} {unit}"
 
 
 def counted(number: int) -> str:

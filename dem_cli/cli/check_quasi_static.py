@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dem_cli.cli.check import clock, human, spread
+from dem_cli.cli.check import clock, spread
 from dem_cli.cli.derived_quasi_static import DerivedQuasiStatic, LoadPlan
 from dem_cli.scenario import Compress, Cyclic, Load, QuasiStaticScenario, Shear
+from dem_cli.units import human
 
 
 def rows(scenario: QuasiStaticScenario, d: DerivedQuasiStatic) -> list[tuple[str, str]]:

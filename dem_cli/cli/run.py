@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from pathlib import Path
 
@@ -53,11 +52,8 @@ def command(
             raise
         progress.say(f"done in {clock(time.monotonic() - began)}: {target}")
     if report:
-        from dem_cli.report.summary import summary
-        from dem_cli.report.text import blocks, show
-        from dem_cli.results import open_results
+        from dem_cli.cli.report import command as print_report
 
-        with open_results(target) as results:
-            show(blocks(summary(results)), sys.stdout)
+        click.get_current_context().invoke(print_report, files=(target,), as_json=False, folder=None, force=False)
     elif settings.verbosity >= 0:
         click.echo(f"dem report {target} says what came out", err=True)

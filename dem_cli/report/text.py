@@ -39,6 +39,8 @@ def number(value: float, form: str = ".4g", unit: str = "") -> str:
     if not math.isfinite(value):
         return NOTHING
     text = format(value, form)
+    if text.startswith("-") and text[1:] == format(0.0, form).lstrip("+"):
+        text = text[1:]  # no -0.000
     return f"{text} {unit}" if unit else text
 
 

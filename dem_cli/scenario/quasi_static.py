@@ -122,8 +122,8 @@ def _for_membrane(stages: Sequence[QuasiStaticStage]) -> Iterator[Mistake]:
             if stage.axial == "x":
                 rule = "contradicts boundary.kind = membrane, which has its pressure across x"
                 yield Mistake(("stage", number, "axial"), rule, f'Write axial = "y", or t{instead[1:]}')
-            if stage.hold not in ("lateral-stress", "mean-stress"):
-                rule = "contradicts boundary.kind = membrane, which gives a pressure and holds no strain"
+            if stage.hold != "lateral-stress":
+                rule = "contradicts boundary.kind = membrane, which holds its pressure on the sides and nothing else"
                 yield Mistake(("stage", number, "hold"), rule, f'Write hold = "lateral-stress", or t{instead[1:]}')
         elif isinstance(stage, Load) and stage.x.strain is not None:
             rule = "contradicts boundary.kind = membrane, which gives a pressure and holds no strain"

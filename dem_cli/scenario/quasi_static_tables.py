@@ -137,12 +137,12 @@ class Solver(Table):
     )
     alpha_prime: Annotated[float, Number(gt=0.0, le=1.0)] | None = key(
         maker=_only_kishino("alpha_prime"),
-        doc="kishino: factor of moves of grains with one contact, (10) (default: 0.5)",
+        doc="kishino: factor of moves of grains with one contact, (11) (default: 0.5)",
         example=0.5,
     )
     beta: Annotated[float, Number(ge=0.0)] | None = key(
         maker=_only_kishino("beta"),
-        doc="kishino: factor of moves of grains without contacts, (13) (default: 20)",
+        doc="kishino: factor of moves of grains without contacts, (10) (default: 20)",
         example=20,
     )
     beta_prime: Annotated[float, Number(ge=0.0)] | None = key(

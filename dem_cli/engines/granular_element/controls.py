@@ -11,6 +11,7 @@ from dem_cli.engines.granular_element.boundary import Servos
 from dem_cli.engines.granular_element.sample import Sample, no_servos, servos
 from dem_cli.errors import RunError
 from dem_cli.state import Floats
+from dem_cli.units import human
 
 
 def _along(direction: int) -> tuple[float, float]:
@@ -106,8 +107,10 @@ class LoadControl:
 def refuse_unreached(where: str, missing: float, wanted: str, reached: Floats) -> None:
     """RunError if a stress that is held is missed by more than a hundredth."""
     if missing > 0.01:
+        across = " and ".join(
+            f"{human(float(one), 'Pa')} across {name}" for one, name in zip(reached, "xy", strict=True)
+        )
         raise RunError(
-            f"{where}: the stress that is to be held is not reached ({wanted}); the boundary bears {reached[0]:.4g} Pa across x and "
-            f"{reached[1]:.4g} Pa across y. The sample yields or has fallen apart: end the stage before, prescribe the strain, or take "
-            "smaller increments or more solver.sub_steps"
+            f"{where}: the stress that is to be held is not reached ({wanted}); the boundary bears {across}. The sample yields or has "
+            "fallen apart: end the stage before, prescribe the strain, or take smaller increments or more solver.sub_steps"
         )

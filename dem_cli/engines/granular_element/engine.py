@@ -21,6 +21,7 @@ from dem_cli.engines.granular_element.step import Done, NotFiniteError, collapse
 from dem_cli.errors import RunError
 from dem_cli.scenario import Compress, Cyclic, Load, Shear
 from dem_cli.state import Increment
+from dem_cli.units import human
 
 ROUGH = 100.0  # times the accuracy: enough for levels of compression before the last
 LOW = 0.4  # share of the last level, below which samples are nearly isostatic and equilibrium is not waited for
@@ -91,9 +92,9 @@ class GranularElementEngine(Apparatus):
             if last:
                 self.sample.with_friction(law.friction, law.cohesion)
                 done.add(self._prepare(servos, target, last=True, low=False))
-                refuse_unreached(self.at(1), done.stress_error, f"{target:.4g} Pa all round", self.stress())
+                refuse_unreached(self.at(1), done.stress_error, f"{human(target, 'Pa')} all round", self.stress())
                 self.set_reference()
-            yield self.next(done, f"{target:.4g} Pa all round" if last else "", warn=last)
+            yield self.next(done, f"{human(target, 'Pa')} all round" if last else "", warn=last)
 
     def _prepare(self, servos: Servos, stress: float, *, last: bool, low: bool) -> Done:
         """Equilibrium under the servos, followed iterate by iterate."""
@@ -134,7 +135,10 @@ class GranularElementEngine(Apparatus):
             done_so_far = self.shear_strain() - begun if is_membrane(self.sample) else done_so_far + growth
             over = done_so_far >= stage.shear_strain * (1.0 - TINY)
             yield self.next(
-                done, f"shear strain of {stage.shear_strain:.4g} reached" if over else "", control, stage.total
+                done,
+                f"shear strain of {100.0 * stage.shear_strain:.4g} % reached" if over else "",
+                control,
+                stage.total,
             )
 
     def _load(self, stage: Load) -> Iterator[Increment]:
@@ -155,7 +159,7 @@ class GranularElementEngine(Apparatus):
                 share = (number - 1 + part / parts) / stage.increments
                 done.add(self.sub_step(*control.step(sample, share)))
             wanted = ", ".join(
-                f"{pair[1]:.4g} Pa across {name}" for pair, name in zip(stress, "xy", strict=True) if pair
+                f"{human(pair[1], 'Pa')} across {name}" for pair, name in zip(stress, "xy", strict=True) if pair
             )
             refuse_unreached(self.at(1), done.stress_error, wanted, self.stress())
             yield self.next(done, "stresses and strains reached" if number == stage.increments else "")
