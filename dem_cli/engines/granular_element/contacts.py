@@ -52,8 +52,8 @@ class Law(NamedTuple):
 class Near(NamedTuple):
     """Contacts that may come to touch while no disc moves more than half a skin, and their forces at the last look.
 
-    start, neighbour: half list; first, second (m,): the same as pairs; memory (COLUMNS, m); normal, shear [N], slip [m] (m,): what the slider has
-    cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made; work
+    start, neighbour: half list; first, second (m,): the same as pairs; memory (COLUMNS, m); normal, shear [N], slip [m] (m,): what the slider
+    has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made; work
     (WORK, m): room for numbers of each pair.
     """
 
