@@ -227,6 +227,7 @@ def test_servo_errors() -> None:
     np.testing.assert_allclose(
         error, [50.0 * 2.0 * hy * DEPTH / (kn * hx), -70.0 * 2.0 * hx * DEPTH / (3.0 * kn * hy)], rtol=1e-9
     )
+    np.testing.assert_allclose(push, [2.0 * KN * hx * hx * error[0], 6.0 * KN * hy * hy * error[1]], rtol=1e-9)
     sample.box[2] += 1e-3
     gap = sample.look().sums
     servo_errors(both, gap, sample.area, DEPTH, sample.box, kn, r, error, push)

@@ -211,6 +211,7 @@ def test_membrane_holds_its_pressure() -> None:
         assert one.walls.name == ("bottom", "top")
         assert one.stress[0] == pytest.approx(SIGMA, rel=0.06)
         assert one.boundary > 0
+        assert set(one.contacts.j[one.contacts.j < 0].tolist()) == {-1, -2}  # walls are numbered as they are told
         assert len(one.grains) == 40 + one.boundary
         assert one.area == pytest.approx(one.width * one.height, rel=1e-12)
     assert found[-1].stress[1] > 1.1 * found[-1].stress[0]
