@@ -61,7 +61,7 @@ def test_numbers_by_their_definitions(tmp_path: Path) -> None:
     moved = 0.5 * 0.0005 / 4 * 0.008 / (15e3 * 0.008 * 0.01 / 1e5)
     assert found["stages"][1]["moved"] == pytest.approx(moved)
     assert found["stages"][3]["moved"] == pytest.approx(moved / 5)
-    assert found["run_seconds"] == pytest.approx(0.6e-3 * (50 / 122) ** 1.5 * 4 * 486)
+    assert found["run_seconds"] == pytest.approx(24e-3 * (50 / 122) ** 1.15 * 4 * 486)
 
 
 def test_accuracy_that_is_given(tmp_path: Path) -> None:

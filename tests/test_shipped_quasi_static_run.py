@@ -18,15 +18,15 @@ SHORTER = {
     "biaxial-three-discs-wall-friction": ("stage.shear.shear_strain=0.01",),
     "biaxial-2000": ("grains.count=100", "stage.shear.shear_strain=0.0025"),
     "biaxial-membrane": ("grains.count=100", "stage.shear.shear_strain=0.0025"),
-    "undrained-cyclic-loose": ("stage.cyclic.cycles=1", "stage.cyclic.increment=0.0002"),
-    "undrained-cyclic-dense": ("stage.cyclic.cycles=1", "stage.cyclic.increment=0.0002"),
+    "undrained-cyclic-loose": (),
+    "undrained-cyclic-dense": ("stage.cyclic.cycles=3",),
 }
 
 
 @pytest.fixture(scope="module", params=SHORTER)
 def results(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Results]:
     scenario = load_scenario(folder() / f"{request.param}.toml", SHORTER[request.param])
-    with open_results(run_scenario(scenario, tmp_path_factory.mktemp("shipped") / "run.h5")) as opened:
+    with open_results(run_scenario(scenario, tmp_path_factory.mktemp("shipped") / f"{request.param}.h5")) as opened:
         yield opened
 
 
@@ -37,10 +37,15 @@ def test_each_has_a_shorter_form() -> None:
 
 def test_ends_well(results: Results) -> None:
     assert results.complete
-    assert results.warnings == []
+    if (
+        results.path.stem == "undrained-cyclic-loose"
+    ):  # grains that bear next to nothing: collapses may be left out of balance
+        assert all("cyclic" in one and "not in balance" in one for one in results.warnings)
+    else:
+        assert results.warnings == []
     compressed, last = results.stages[0], results.stages[-1]
     assert "Pa all round" in compressed.reason
-    assert last.reason.startswith(("shear strain of", "1 cycles done", "liquefied"))
+    assert last.reason.startswith(("shear strain of", "3 cycles done", "liquefied"))
     assert results.series["max_overlap"].max() < 0.05
 
 
@@ -70,3 +75,12 @@ def test_shears_the_sample(results: Results) -> None:
     ratio = results.series["stress_ratio"][results.series["stage"] == 1]
     assert np.nanmax(ratio) > 1.05
     assert ratio[0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_only_the_loose_sample_liquefies(results: Results) -> None:
+    """Under cycles of the closed pores; a drained sample has no pore pressure."""
+    mean = results.series["mean_stress"][results.series["stage"] == 1]
+    liquefied = results.stages[-1].reason.startswith("liquefied")
+    assert liquefied == ("loose" in results.path.stem)
+    if results.scenario["stage"][1]["hold"] == "volume":
+        assert (mean[-1] < 0.01 * mean[0]) if liquefied else (mean.min() > 0.95 * mean[0])
