@@ -102,6 +102,8 @@ def test_quasi_static_file_in_explicit_dem(folder: Path) -> None:
     assert assembly.walls.x1[1] == width
     assert len(assembly.grains) == GRAINS
     assert of_file(folder, small, "walls.h5").to_dict()["container"]["width"] == "0.3 m"
+    again = of_file(folder, small, "walls.h5", {"container": ABSENT})
+    assert again.container.width == width
     again = of_file(folder, small, "walls.h5", {"container.width": ABSENT})
     assert again.hash == scenario.hash
 

@@ -80,6 +80,7 @@ EVERYTHING = {
     "grains.radius": {"classes": [{"radius": "3 mm", "count": 20}, {"radius": "4.5 mm", "count": 7}]},
     "stage.0.friction": "15 deg",
     "stage.2": {"kind": "load", "name": "more", "from": "shear", "x": {"stress": "2 bar"}, "y": {"strain": 0.1}},
+    "stage.1.hold": "lateral-stress",
     "stage.3.hold": "lateral-stress",
     "output": {"frames": 5, "tracks": {"grains": [0, 26]}},
 }

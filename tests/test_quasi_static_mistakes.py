@@ -189,6 +189,13 @@ ONE_LINE: list[tuple[dict[str, Any], str]] = [
 ]
 
 
+def test_set_tells_whose_key_it_is() -> None:
+    with pytest.raises(
+        ScenarioError, match=r'contact\.restitution=0\.5: belongs to engine = "explicit"\. Leave it out'
+    ):
+        parse_scenario(quick({}), overrides=["contact.restitution=0.5"])
+
+
 @pytest.mark.parametrize(("changes", "line"), ONE_LINE, ids=lambda value: str(value)[:60])
 def test_mistake(changes: dict[str, Any], line: str) -> None:
     found = lines_of(quick(changes))

@@ -24,7 +24,7 @@ from dem_cli.cli import progress as progress_module
 from dem_cli.cli.progress import IncrementProgress, TimeProgress, clock, progress_of
 from dem_cli.errors import ResultsError, RunError
 from dem_cli.results import open_results, partial_path
-from dem_cli.scenario import QuasiStaticScenario, parse_scenario
+from dem_cli.scenario import QuasiStaticScenario, load_scenario, parse_scenario
 from dem_cli.state import Increment
 
 Stand = Callable[[list[Increment], BaseException | None], QuasiStaticScenario]
@@ -275,3 +275,28 @@ def test_the_engine_itself_writes_samples_in_equilibrium(tmp_path: Path) -> None
             assert np.abs(c.shear).max() > 0.1 * c.normal.mean()
             at_walls = (force * ~pairs) @ np.stack([c.px, c.py]).T / (one.area * scenario.depth)
             np.testing.assert_allclose(branch_stress(one, scenario.depth), at_walls, atol=1e-4 * at_walls.max())
+
+
+def test_a_sample_at_stress_from_a_file_is_told_to_be_out_of_balance(tmp_path: Path) -> None:
+    """The file's stress is there, its shear forces are not."""
+    first = parse_scenario(REAL)
+    assert isinstance(first, QuasiStaticScenario)
+    run.run_scenario(first, tmp_path / "first.h5")
+    text = re.sub(r"count = 16, radius = {.*?}, ", "", REAL).replace(
+        'method = "overlapping"', 'method = "file", file = "first.h5"'
+    )
+    for stages, told in ((text, 0), (re.sub(r".*compress.*\n", "", text), 1)):
+        (tmp_path / "next.toml").write_text(stages)
+        with open_results(
+            run.run_scenario(load_scenario(tmp_path / "next.toml"), tmp_path / "next.h5", force=True)
+        ) as results:
+            assert len([line for line in results.warnings if "the packing is not in balance" in line]) == told
+            assert results.series["mean_stress"][0] == pytest.approx(15e3, rel=1e-5)
+
+
+def test_iterations_are_limited_where_a_limit_is_given(tmp_path: Path) -> None:
+    scenario = parse_scenario(REAL, overrides=["solver.max_iterations=10"])
+    assert isinstance(scenario, QuasiStaticScenario)
+    words = r"\(15 kPa all round\); the boundary bears [\d.]+ k?Pa across x and .* more solver\.max_iterations"
+    with pytest.raises(RunError, match=words):
+        run.run_scenario(scenario, tmp_path / "out.h5")

@@ -307,7 +307,7 @@ def draw_compared(several: Sequence[Results], number: int | None) -> Figure:
 
 
 def _peaks(some: Sequence[Curve]) -> str:
-    words = "; dots: peak of s1/s2" if any(one.peak is not None for one in some) else ""
+    words = "\ndots: peak of s1/s2" if any(one.peak is not None for one in some) else ""
     return (
         f"{words}; strokes: collapses"
         if any(np.any(one.rows["event"] > 0) for one in some if not one.undrained)

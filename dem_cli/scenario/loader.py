@@ -87,14 +87,15 @@ def _width_of_file(raw: dict[str, Any], folder: Path, kind: type[AnyScenario]) -
     """Fills in the width of an explicit scenario's container, where it is left out, from the result file that gives the grains."""
     packing, container = raw.get("packing"), raw.get("container")
     name = packing.get("file") if isinstance(packing, dict) else None
-    if kind is not Scenario or not isinstance(container, dict) or "width" in container or not isinstance(name, str):
+    given = container if isinstance(container, dict) else {} if container is None else None
+    if kind is not Scenario or given is None or "width" in given or not isinstance(name, str):
         return
     stage = packing.get("stage") if isinstance(packing, dict) else None
     if not is_result_file(name):
         return
     with contextlib.suppress(ScenarioError):  # said with the other mistakes
         stored = read_stored_grains(folder / name, stage if isinstance(stage, str) else None)
-        container["width"] = units.write(stored.width, "m")
+        raw["container"] = {**given, "width": units.write(stored.width, "m")}
 
 
 def _records(raw: dict[str, Any], folder: Path, scenario: AnyScenario | None) -> list[Found]:

@@ -65,6 +65,9 @@ def _set(table: type[Table], raw: dict[str, Any], parts: list[str], value: Any, 
     name, rest = parts[0], parts[1:]
     known = keys_of(table)
     if name not in known:
+        if name in table.elsewhere:
+            engine, advice = table.elsewhere[name]
+            raise _RefusedError(f'belongs to engine = "{engine}"', advice)
         near = nearest(name, known)
         full = ".".join([*before, near, *rest]) if near else ""
         advice = f'Did you mean "{full}"?' if near else f"Known here: {', '.join(known)}"

@@ -66,9 +66,9 @@ class Packing(Table):
     )
     file: str | None = key(
         None,
-        "result file of dem run (.h5), of any engine: its grains as they lie, without their contacts' memory; or CSV file, a grain a "
-        "line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), angle (degrees), spin (rad/s) and, for ellipses, "
-        "aspect (a/b) may follow",
+        "result file of dem run (.h5), of any engine: its grains as they lie, without shear forces, so compress or settle them; or CSV file, "
+        "a grain a line, with header x,y,r: centres and radii; columns vx,vy (velocity, per second), angle (degrees), spin (rad/s) and, "
+        "for ellipses, aspect (a/b) may follow",
         example="grains.csv",
     )
     file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")

@@ -152,7 +152,7 @@ class Solver(Table):
     )
     max_iterations: Annotated[int, Whole(ge=1)] | None = key(
         maker=lambda good: 100000 if good["method"] == "kishino" else None,
-        doc="iterations at most in a sub-step (default: as the ladder of fallbacks has it; kishino: 100000)",
+        doc="iterations at most in a sub-step; momentum: on each of its fallbacks (default: their own limits; kishino: 100000)",
         example=100000,
     )
     max_overlap: Annotated[float, Number(gt=0.0, le=1.0)] = key(

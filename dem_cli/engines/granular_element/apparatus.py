@@ -23,6 +23,8 @@ from dem_cli.state import Floats, Increment, QuasiStaticEnergy
 ACCURACY = 1e-5  # of mean stress x mean diameter x depth
 LEAST = 0.01  # of the stress at the start of a stage: the accuracy does not follow the stress below
 USUAL = 20  # sub-steps over which the usual work is averaged
+AMISS_AT_FIRST = 0.01  # mean resultant force over mean contact force of a packing, above which it is told
+NO_LIMIT = 2**62  # of iterations but those of the ladder
 SHORT = 2.0  # times the accuracy: what is left above it is told
 
 
@@ -38,6 +40,17 @@ class Place:
 
     def copy(self) -> Place:
         return replace(self, sample=self.sample.copy())
+
+
+def amiss_at_first(start: Increment) -> tuple[str, ...]:
+    """A warning if the packing, which has no shear forces, is not in balance: a result file's grains at stress are not."""
+    if start.unbalanced <= AMISS_AT_FIRST:
+        return ()
+    return (
+        f"the packing is not in balance: the mean resultant force is {start.unbalanced:.2g} of the mean contact force, as a file gives "
+        "no shear forces. The first increment brings it into balance, and what that takes counts as a collapse. Begin with a stage "
+        'kind = "compress", or do all stages in one run',
+    )
 
 
 class Apparatus:
@@ -206,8 +219,7 @@ class Apparatus:
             for name in ("alpha", "alpha_prime", "beta", "beta_prime")
             if (value := getattr(given, name)) is not None
         }
-        if given.max_iterations is not None:
-            factors["most"] = given.max_iterations
+        factors["most"] = NO_LIMIT if given.max_iterations is None else given.max_iterations
         return Solver(by_momentum, accuracy, stress, **factors)
 
     # -- what is refused

@@ -112,5 +112,6 @@ def refuse_unreached(where: str, missing: float, wanted: str, reached: Floats) -
         )
         raise RunError(
             f"{where}: the stress that is to be held is not reached ({wanted}); the boundary bears {across}. The sample yields or has "
-            "fallen apart: end the stage before, prescribe the strain, or take smaller increments or more solver.sub_steps"
+            "fallen apart: end the stage before, prescribe the strain, or take smaller increments, more solver.sub_steps or, where it is "
+            "given, more solver.max_iterations"
         )

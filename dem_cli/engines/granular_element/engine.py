@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from dem_cli.engines.granular_element.apparatus import Apparatus, Place
+from dem_cli.engines.granular_element.apparatus import Apparatus, Place, amiss_at_first
 from dem_cli.engines.granular_element.boundary import Servos
 from dem_cli.engines.granular_element.chains import release
 from dem_cli.engines.granular_element.controls import (
@@ -48,7 +48,8 @@ class GranularElementEngine(Apparatus):
             if not isinstance(stage, Compress) and math.isnan(self.place.width):
                 self.set_reference()
             self.first_stress = float(self.stress().mean())
-            yield replace(self.observe(Done()), stage_start=True, due=self.due(first=True))
+            start = replace(self.observe(Done()), stage_start=True, due=self.due(first=True))
+            yield start if number or isinstance(stage, Compress) else replace(start, warnings=amiss_at_first(start))
             try:
                 if isinstance(stage, Compress):
                     yield from self._compress(stage)

@@ -23,7 +23,9 @@ NO_GUESS = np.empty((0, 3))
 
 @dataclass(frozen=True)
 class Solver:
-    """How equilibrium is found. accuracy [N] and stress [-]: when it is; momentum: the momentum iteration, else Kishino's."""
+    """How equilibrium is found. accuracy [N] and stress [-]: when it is; momentum: the momentum iteration, else Kishino's; most:
+    iterations on a rung of the ladder, which has limits of its own too.
+    """
 
     momentum: bool
     accuracy: float
@@ -37,7 +39,7 @@ class Solver:
     def pace(self, n: int, step: float, cap: float, most: int, *, follow: bool, far: float = math.inf) -> Pace:
         patience = int(250 + 25 * math.sqrt(n))
         return Pace(
-            self.momentum, step, cap, most, follow, self.accuracy, self.stress, far, patience, self.alpha_prime, self.beta,
+            self.momentum, step, cap, min(most, self.most), follow, self.accuracy, self.stress, far, patience, self.alpha_prime, self.beta,
             self.beta_prime,
         )  # fmt: skip
 
