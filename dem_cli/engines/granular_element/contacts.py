@@ -384,11 +384,7 @@ def lose_in_step(x, began, near, law):
         i = near.disc[c]
         near.wall_memory[LOST, c] = 0.0
         if near.wall_normal[c] > 0.0 and near.wall_memory[STEP_NORMAL, c] > 0.0:
-            nx, ny = 0.0, 0.0
-            if near.side[c] <= RIGHT:
-                nx = 1.0 if near.side[c] == RIGHT else -1.0
-            else:
-                ny = 1.0 if near.side[c] == TOP else -1.0
+            nx, ny, _ = wall_of(near.side[c], near.box)
             along = (x[i, 1] - began[i, 1]) * nx - (x[i, 0] - began[i, 0]) * ny + x[i, 2] - began[i, 2]
             old, new = near.wall_memory[STEP_SHEAR, c], near.wall_shear[c]
             near.wall_memory[LOST, c] = 0.5 * (old + new) * (along - (new - old) / law.kt)

@@ -119,6 +119,8 @@ class GranularElementEngine(Apparatus):
         """Brings a loose packing together, evenly, until its walls bear half of the stress."""
         sample = self.sample
         solver = self.solver(ROUGH * self.accuracy(stress), 1e-3, momentum=True)
+        if is_membrane(sample):  # without its pressure it would only be pushed out
+            hold_stress(sample, {0: stress}, stress)
         while float(self.stress().min()) < 0.5 * stress:
             self.check()
             sample.begin()
@@ -130,10 +132,15 @@ class GranularElementEngine(Apparatus):
         control = ShearControl.start(self.sample, stage.axial, stage.hold)
         self.place.axial = control.axial
         begun, done_so_far = self.shear_strain(), 0.0
-        while done_so_far < stage.shear_strain * (1.0 - TINY):
-            growth = min(stage.increment, stage.shear_strain - done_so_far)
-            done = self._grow(control, growth)
-            done_so_far = self.shear_strain() - begun if is_membrane(self.sample) else done_so_far + growth
+        over = False
+        while not over:
+            if is_membrane(self.sample):  # its lateral strain is what comes; the stage ends with the nearest increment
+                done = self._grow(control, stage.increment)
+                done_so_far = self.shear_strain() - begun + 0.5 * stage.increment
+            else:
+                growth = min(stage.increment, stage.shear_strain - done_so_far)
+                done = self._grow(control, growth)
+                done_so_far += growth
             over = done_so_far >= stage.shear_strain * (1.0 - TINY)
             yield self.next(
                 done,
