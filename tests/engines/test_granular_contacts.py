@@ -276,9 +276,9 @@ def test_what_sliding_along_a_wall_costs(side: int) -> None:
     sample.x[0, 2] += 2e-4
     sample.look()
     lose(sample.near)
-    both = [sample.near.wall_memory[0, LOST]]
+    both = [sample.near.wall_memory[LOST, 0]]
     lose_in_step(sample.x, began, sample.near, sample.law)
-    both.append(sample.near.wall_memory[0, LOST])
+    both.append(sample.near.wall_memory[LOST, 0])
     np.testing.assert_allclose(both, 0.5 * limit * (5e-4 - limit / KT), rtol=1e-6)
 
 
@@ -291,11 +291,11 @@ def test_a_new_list_changes_no_force(seed: int) -> None:
     sample.look()
     sample.begin()
     before = fixing(sample).copy()
-    sample.near.memory[:, LOST] = 1.0
+    sample.near.memory[LOST] = 1.0
     kept = sample.copy()
     kept.near = renew(kept.x, kept.bodies, kept.law, kept.box, 2.0 * kept.skin, kept.near)
     np.testing.assert_allclose(fixing(kept), before, rtol=0, atol=1e-12 * KN * RADIUS)
-    assert kept.near.memory[:, LOST].sum() == sample.near.first.size
+    assert kept.near.memory[LOST].sum() == sample.near.first.size
     assert np.any(kept.near.wall_normal > 0.0)
     kept.near = renew(kept.x, kept.bodies, kept.law, kept.box, 1e-6 * kept.skin, kept.near)
     np.testing.assert_allclose(fixing(kept), before, rtol=0, atol=1e-12 * KN * RADIUS)
