@@ -117,8 +117,11 @@ def _voids(increment: Increment) -> dict[str, float]:
 
 
 def _largest_share(energy: Floats) -> float:
-    """Share of the contact that dissipates most; NaN where nothing is dissipated."""
-    total = float(energy.sum())
+    """Share of the contact that dissipates most; NaN where nothing is dissipated.
+
+    A force that turns round within a sub-step may give a contact a negative trifle by (28): that is no part of the whole.
+    """
+    total = float(energy[energy > 0.0].sum())
     return float(energy.max()) / total if total > 0.0 else math.nan
 
 

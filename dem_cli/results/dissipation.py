@@ -40,7 +40,7 @@ def create_dissipation(file: Any, layout: Layout) -> Table | None:
 def ranked(slips: Slips) -> list[Floats]:
     """Columns of DISSIPATION for one increment, (RANKS,) each; contacts that dissipate alike keep their order."""
     order = np.argsort(-slips.energy, kind="stable")[:RANKS]
-    total = float(slips.energy.sum())
+    total = float(slips.energy[slips.energy > 0.0].sum())
     columns = [np.full(RANKS, fill) for fill in (-1.0, -1.0, np.nan, np.nan)]
     share = slips.energy / total if total > 0.0 else np.full(len(slips), np.nan)
     for column, values in zip(columns, (slips.i, slips.j, slips.energy, share), strict=True):

@@ -85,7 +85,7 @@ def test_what_is_held(hold: str, axial: str) -> None:
         if k:
             assert one.axial == along
             assert s[along] > s[across]
-    assert found[-1].stop_reason == "shear strain of 0.0022 reached"
+    assert found[-1].stop_reason == "shear strain of 0.22 % reached"
     assert [one.stage_end for one in found] == [False] * 5 + [True]
 
 
@@ -215,7 +215,8 @@ def test_membrane_holds_its_pressure() -> None:
         assert len(one.grains) == 40 + one.boundary
         assert one.area == pytest.approx(one.width * one.height, rel=1e-12)
     assert found[-1].stress[1] > 1.1 * found[-1].stress[0]
-    assert shear_strain(found[-1]) >= 0.0025
+    # lateral strain comes as it does: the stage ends with the nearest increment
+    assert abs(shear_strain(found[-1]) - 0.0025) <= 0.5 * 0.0005
     outer = found[-1].grains.x[40:]
     middle = outer.mean()
     grown = [np.ptp(one.grains.x[40:]) for one in (found[0], found[-1])]

@@ -168,7 +168,7 @@ class Apparatus:
             balance=done.balance,
             unbalanced=resultant / mean_force if mean_force > 0.0 else 0.0,
             iterations=done.iterations,
-            sub_steps=1 if self.in_stage == 0 else self.sub_steps,
+            sub_steps=done.sub_steps,
             rung=done.rung,
             event=done.event,
         )

@@ -48,6 +48,8 @@ class GranularElementEngine(Apparatus):
             if not isinstance(stage, Compress) and math.isnan(self.place.width):
                 self.set_reference()
             self.first_stress = float(self.stress().mean())
+            if isinstance(stage, Shear | Cyclic):
+                self.place.axial = int(stage.axial == "y")
             start = replace(self.observe(Done()), stage_start=True, due=self.due(first=True))
             yield start if number or isinstance(stage, Compress) else replace(start, warnings=amiss_at_first(start))
             try:
@@ -130,7 +132,6 @@ class GranularElementEngine(Apparatus):
 
     def _shear(self, stage: Shear) -> Iterator[Increment]:
         control = ShearControl.start(self.sample, stage.axial, stage.hold)
-        self.place.axial = control.axial
         begun, done_so_far = self.shear_strain(), 0.0
         over = False
         while not over:
@@ -174,7 +175,6 @@ class GranularElementEngine(Apparatus):
 
     def _cycle(self, stage: Cyclic) -> Iterator[Increment]:
         control = ShearControl.start(self.sample, stage.axial, stage.hold)
-        self.place.axial = control.axial
         limit = stage.limit.strain or stage.limit.stress or (stage.limit.stress_ratio or 0.0) * control.mean
         begun = self.shear_strain()
 

@@ -43,6 +43,7 @@ WALL_STEP = 0.3  # share of a servo's error that a momentum step takes
 FIRM, LOOSE = 0.1, 1.0  # added to the blocks, in units of kn, for discs with two contacts and more, and with less
 LOOK = 50  # iterations between two looks at how far discs have moved
 SOON = 4  # iterations after which blocks are made anew where contacts opened or closed
+STRAIN_PARTS = 8  # pieces of a prescribed strain where the path is followed
 REFRESH = 20  # iterations after which blocks are made anew though no contact opened or closed
 
 
@@ -239,9 +240,13 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
     error, push, speed = np.zeros(MOST_SERVOS), np.zeros(MOST_SERVOS), np.zeros(MOST_SERVOS)
     age, since, worst, which, stress = 0, REFRESH, 0.0, -1, 0.0
     cap, best, waited, flips = pace.cap, np.inf, 0, 0.0
-    for iteration in range(-1 if pace.follow else 0, pace.most + 1):
-        if iteration == 0:
+    began, parts = box[2:].copy(), STRAIN_PARTS if pace.follow else 0
+    for iteration in range(-parts, pace.most + 1):
+        if iteration == 0 and not pace.follow:
             _strain(x, box, goal, guess, bodies, chain, pace.momentum)
+        elif iteration > -parts and iteration <= 0:
+            # piece by piece, so that the work of the strain is known
+            _strain(x, box, began + (iteration + parts) / parts * (goal - began), guess, bodies, chain, pace.momentum)
         if is_stale(x, box, near, skin):
             had = lost_so_far(near)
             near = renew(x, bodies, law, box, skin, near)
@@ -250,7 +255,7 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
         look(x, anchor, near, bodies, law, chain, box, depth, room, sums)
         if pace.follow:
             lose(near)
-            if iteration >= 0:
+            if iteration > -parts:
                 account(
                     x, before, room.fixing, room.old_fixing, bodies, room.old_load, sums, old_sums, box, old_box, ledger
                 )
