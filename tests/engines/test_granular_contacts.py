@@ -11,15 +11,8 @@ from granular_samples import KN, KT, RADIUS, cluster, few
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dem_cli.engines.granular_element.contacts import (
-    LOST,
-    contact_stiffness,
-    is_stale,
-    lose,
-    lose_in_step,
-    lost_so_far,
-    renew,
-)
+from dem_cli.engines.granular_element.contacts import LOST, contact_stiffness, is_stale, renew
+from dem_cli.engines.granular_element.ledger import lose, lose_in_step, lost_so_far
 from dem_cli.engines.granular_element.sample import Sample
 from dem_cli.state import Floats
 

@@ -20,9 +20,9 @@ from dem_cli.jit import kernel
 GRAIN, DRIVEN, MEMBRANE, TIED = 0, 1, 2, 3
 # Rows of the memory of a contact: shear and normal force where the slider starts from ("anchor"), the same at the start of the
 # sub-step, and the energy that sliding has cost in it [J].
-SHEAR, NORMAL, STEP_SHEAR, STEP_NORMAL, LOST, COLUMNS = 0, 1, 2, 3, 4, 5
+SHEAR, NORMAL, STEP_SHEAR, STEP_NORMAL, LOST, OVERLAP, COLUMNS = 0, 1, 2, 3, 4, 5, 6
 # Rows of the work of pairs: branch, sum of branches, relative turn, reach [m]; force [N].
-EX, EY, MX, MY, TURN, REACH, FX, FY, WORK = 0, 1, 2, 3, 4, 5, 6, 7, 8
+EX, EY, MX, MY, TURN, REACH, FX, FY, DEPTH, WORK = 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
 LEFT, RIGHT, BOTTOM, TOP = 0, 1, 2, 3
 # Sums over the boundary: force times arm about the centre along x and y [N m], their stiffness against strain [N m], force on both walls
 # across x and across y [N], smallest gap at these walls [m], contacts that opened or closed since the last look.
@@ -179,7 +179,7 @@ def _gather(x, anchor, near, bodies):
 
 
 @kernel()
-def _pair_law(ex, ey, mx, my, turn, reach, anchored, normal, shear, slip, fx, fy, kn, kt, mu, cohesion):
+def _pair_law(ex, ey, mx, my, turn, reach, anchored, normal, shear, slip, fx, fy, depth, kn, kt, mu, cohesion):
     """Forces of all pairs from what was gathered, without a branch, so that several are done at once; returns how many opened or closed.
 
     The way of i against j since the anchor is (branch at the anchor) - (branch now) = m - 2 e.
@@ -187,7 +187,8 @@ def _pair_law(ex, ey, mx, my, turn, reach, anchored, normal, shear, slip, fx, fy
     flips = 0
     for c in range(ex.size):
         distance = math.sqrt(ex[c] * ex[c] + ey[c] * ey[c])
-        p = kn * max(reach[c] - distance, 0.0)
+        depth[c] = reach[c] - distance
+        p = kn * max(depth[c], 0.0)
         nx, ny = ex[c] / distance, ey[c] / distance
         along = 2.0 * (my[c] * ex[c] - mx[c] * ey[c]) / math.sqrt(mx[c] * mx[c] + my[c] * my[c]) + turn[c]
         trial = anchored[c] + kt * along
@@ -216,7 +217,7 @@ def forces(x, anchor, near, bodies, law, box, fixing, sums):
     _gather(x, anchor, near, bodies)
     flips = _pair_law(
         work[EX], work[EY], work[MX], work[MY], work[TURN], work[REACH], near.memory[SHEAR], near.normal, near.shear, near.slip,
-        work[FX], work[FY], kn, kt, law.friction, law.cohesion,
+        work[FX], work[FY], work[DEPTH], kn, kt, law.friction, law.cohesion,
     )  # fmt: skip
     fixing[:] = 0.0
     for i in range(bodies.grains):  # the load of membranes comes with their pressure
@@ -330,69 +331,3 @@ def contact_stiffness(x, near, law, box, stiffness, last):
             rough = law.kt if law.wall_friction[near.side[c]] > 0.0 else 0.0
             _add(stiffness, near.disc[c], nx, ny, law.kn, rough)
             last[near.disc[c], 0], last[near.disc[c], 1] = nx, ny
-
-
-@kernel()
-def set_anchor(x, anchor, near):
-    """The slider starts from here."""
-    anchor[:] = x
-    near.memory[SHEAR], near.memory[NORMAL] = near.shear, near.normal
-    near.wall_memory[SHEAR], near.wall_memory[NORMAL] = near.wall_shear, near.wall_normal
-
-
-@kernel()
-def begin_step(near):
-    """A sub-step starts from here: forces are kept, and nothing has been lost yet."""
-    near.memory[STEP_SHEAR], near.memory[STEP_NORMAL], near.memory[LOST] = near.shear, near.normal, 0.0
-    near.wall_memory[STEP_SHEAR], near.wall_memory[STEP_NORMAL] = near.wall_shear, near.wall_normal
-    near.wall_memory[LOST] = 0.0
-
-
-@kernel()
-def lose(near):
-    """Adds to LOST what sliding since the anchor has cost: mean shear force times slip, where there was force at both ends (28)."""
-    for c in range(near.first.size):
-        if near.slip[c] != 0.0 and near.memory[NORMAL, c] > 0.0:
-            near.memory[LOST, c] += 0.5 * (near.memory[SHEAR, c] + near.shear[c]) * near.slip[c]
-    for c in range(near.disc.size):
-        if near.wall_slip[c] != 0.0 and near.wall_memory[NORMAL, c] > 0.0:
-            near.wall_memory[LOST, c] += 0.5 * (near.wall_memory[SHEAR, c] + near.wall_shear[c]) * near.wall_slip[c]
-
-
-@kernel()
-def lost_so_far(near):
-    """Sum of LOST [J]."""
-    return near.memory[LOST].sum() + near.wall_memory[LOST].sum()
-
-
-@kernel()
-def lose_in_step(x, began, near, law):
-    """LOST of a whole sub-step by (25)-(28), from its start at `began` (n, 3): for a slider that was moved on in between."""
-    for c in range(near.first.size):
-        i, j = near.first[c], near.second[c]
-        near.memory[LOST, c] = 0.0
-        if near.normal[c] > 0.0 and near.memory[STEP_NORMAL, c] > 0.0:
-            mx = x[j, 0] - x[i, 0] + began[j, 0] - began[i, 0]
-            my = x[j, 1] - x[i, 1] + began[j, 1] - began[i, 1]
-            ux = (x[i, 0] - began[i, 0]) - (x[j, 0] - began[j, 0])
-            uy = (x[i, 1] - began[i, 1]) - (x[j, 1] - began[j, 1])
-            turn = (x[i, 2] - began[i, 2]) + (x[j, 2] - began[j, 2])
-            along = (mx * uy - my * ux) / math.sqrt(mx * mx + my * my) + turn
-            old, new = near.memory[STEP_SHEAR, c], near.shear[c]
-            near.memory[LOST, c] = 0.5 * (old + new) * (along - (new - old) / law.kt)
-    for c in range(near.disc.size):
-        i = near.disc[c]
-        near.wall_memory[LOST, c] = 0.0
-        if near.wall_normal[c] > 0.0 and near.wall_memory[STEP_NORMAL, c] > 0.0:
-            nx, ny, _ = wall_of(near.side[c], near.box)
-            along = (x[i, 1] - began[i, 1]) * nx - (x[i, 0] - began[i, 0]) * ny + x[i, 2] - began[i, 2]
-            old, new = near.wall_memory[STEP_SHEAR, c], near.wall_shear[c]
-            near.wall_memory[LOST, c] = 0.5 * (old + new) * (along - (new - old) / law.kt)
-
-
-@kernel()
-def stored(near, law):
-    """Energy of the normal and of the tangential springs [J], by (22)."""
-    normal = (near.normal**2).sum() + (near.wall_normal**2).sum()
-    shear = (near.shear**2).sum() + (near.wall_shear**2).sum()
-    return 0.5 * normal / law.kn, 0.5 * shear / law.kt

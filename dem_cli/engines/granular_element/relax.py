@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dem_cli.engines.granular_element.boundary import (
+    FIXING,
     GONE,
     MOST_SERVOS,
     account,
@@ -31,11 +32,9 @@ from dem_cli.engines.granular_element.contacts import (
     count_contacts,
     forces,
     is_stale,
-    lose,
-    lost_so_far,
     renew,
-    set_anchor,
 )
+from dem_cli.engines.granular_element.ledger import lose, lost_so_far, opened_and_closed, set_anchor
 from dem_cli.jit import kernel
 
 BALANCED, UNBALANCED, NOT_A_NUMBER, AWAY = 0, 1, 2, 3
@@ -256,6 +255,7 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
         if pace.follow:
             lose(near)
             if iteration > -parts:
+                ledger[FIXING] -= opened_and_closed(near, law)
                 account(
                     x, before, room.fixing, room.old_fixing, bodies, room.old_load, sums, old_sums, box, old_box, ledger
                 )

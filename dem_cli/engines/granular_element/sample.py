@@ -16,14 +16,12 @@ from dem_cli.engines.granular_element.contacts import (
     Bodies,
     Law,
     Near,
-    begin_step,
     count_contacts,
     no_list,
     renew,
-    set_anchor,
-    stored,
     wall_of,
 )
+from dem_cli.engines.granular_element.ledger import begin_step, set_anchor, stored
 from dem_cli.engines.granular_element.relax import Iterates, look, room_for
 from dem_cli.state import Contacts, Floats
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from dem_cli.engines.granular_element.boundary import BODY, BOUNDARY, FIXING, GONE, LEDGER, Servos, account
-from dem_cli.engines.granular_element.contacts import LOST, lose, lose_in_step
+from dem_cli.engines.granular_element.contacts import LOST
+from dem_cli.engines.granular_element.ledger import lose, lose_in_step
 from dem_cli.engines.granular_element.relax import AWAY, BALANCED, NOT_A_NUMBER, Pace, relax
 from dem_cli.engines.granular_element.sample import Sample, View, no_servos
 from dem_cli.state import Floats, Ints
