@@ -115,7 +115,11 @@ def test_lines(tmp_path: Path) -> None:
         ({"stage.3.limit": {"stress": "2 kPa"}}, "stage 4", "limits of q = 2 kPa"),
         ({"container.gravity": "1 m/s^2"}, "gravity", "1 m/s^2, "),
         ({"packing": {"method": "growth"}}, "packing", "growth: takes about 1 s"),
-        ({"boundary": {"kind": "membrane"}, "stage.3": ABSENT, "stage.2": ABSENT}, "boundary", "links of 1e+04 N/m"),
+        (
+            {"boundary": {"kind": "membrane"}, "stage.3": ABSENT, "stage.2": ABSENT, "stage.1.hold": "lateral-stress"},
+            "boundary",
+            "links of 1e+04 N/m",
+        ),
     ],
     ids=lambda value: str(value)[:50],
 )
