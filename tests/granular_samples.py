@@ -101,12 +101,6 @@ def stages(increments: list[Increment]) -> list[list[Increment]]:
 
 
 @cache
-def kishino(*overrides: str) -> list[Increment]:
-    """The shipped biaxial test of 122 discs to 0.6 % of shear."""
-    return shipped("biaxial-kishino", "stage.shear.shear_strain=0.006", *overrides)
-
-
-@cache
 def three_discs(*overrides: str) -> list[Increment]:
     """The shipped test of three discs."""
     return shipped("biaxial-three-discs", *overrides)

@@ -10,7 +10,6 @@ import numpy as np
 
 from dem_cli.engines.granular_element.boundary import MOST_SERVOS, Chain, Servos, area_inside, stresses
 from dem_cli.engines.granular_element.contacts import (
-    SHEAR,
     SUMS,
     TOP,
     Bodies,
@@ -165,6 +164,3 @@ def servos(
     return Servos(
         number, rows(direction), rows(weight), np.array([*target, *[0.0] * (MOST_SERVOS - number)]), float(scale)
     )
-
-
-__all__ = ["SHEAR", "Sample", "View", "no_servos", "servos"]
