@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Mapping
 from typing import Any, Self
@@ -18,7 +19,7 @@ DRAW_EVERY = 0.2  # s between two updates of the bar
 SPEED_OVER = 10.0  # s of wall time that the speed is an average of
 
 
-class Progress:
+class Progress(ABC):
     """A listener of `run_scenario`; a context manager. verbosity -1: silent. What it says of a state is up to the kind of run."""
 
     def __init__(self, scenario: Scenario | QuasiStaticScenario, verbosity: int = 0) -> None:
@@ -69,7 +70,6 @@ class Progress:
 
     def __call__(self, state: Frame | Increment, row: Mapping[str, float] | None) -> None:
         self._row = row or self._row
-        self.begin(state)
         count = self.count(state)
         if count > 0:  # compiling is over
             self._marks.append((time.monotonic(), count))
@@ -97,24 +97,21 @@ class Progress:
         (began, first), (now, last) = self._marks[0], self._marks[-1]
         return (last - first) / (now - began) if now > began else 0.0
 
-    def begin(self, state: Any) -> None:
-        """Told of every state before anything is said of it."""
-
+    @abstractmethod
     def count(self, state: Any) -> int:
         """What speed is counted in: time steps or increments."""
-        raise NotImplementedError
 
+    @abstractmethod
     def reached(self, state: Any, row: Mapping[str, float]) -> str:
         """Where a stage has ended."""
-        raise NotImplementedError
 
+    @abstractmethod
     def words(self, state: Any) -> str:
         """Where the run is now."""
-        raise NotImplementedError
 
+    @abstractmethod
     def share(self, state: Any) -> float:
         """How much of the run is done, 0 to 1."""
-        raise NotImplementedError
 
 
 class TimeProgress(Progress):
@@ -123,9 +120,10 @@ class TimeProgress(Progress):
     scenario: Scenario
     _stage_began = 0.0
 
-    def begin(self, state: Frame) -> None:
-        if state.stage_start:
+    def __call__(self, state: Frame | Increment, row: Mapping[str, float] | None) -> None:
+        if isinstance(state, Frame) and state.stage_start:
             self._stage_began = state.time
+        super().__call__(state, row)
 
     def count(self, state: Frame) -> int:
         return state.step

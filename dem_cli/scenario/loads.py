@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal
@@ -36,9 +37,9 @@ class QuasiStaticStage(Table):
     )
 
     @property
+    @abstractmethod
     def planned(self) -> int:
         """Increments to expect."""
-        raise NotImplementedError
 
 
 class Compress(QuasiStaticStage):

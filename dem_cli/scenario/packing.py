@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from dem_cli.scenario.quantities import Distance, Length, Number, Whole
 from dem_cli.scenario.stored_grains import is_result_file
-from dem_cli.scenario.table import Given, Mistake, Table, key
+from dem_cli.scenario.table import Given, Mistake, Table, key, misplaced
 
 Method = Literal["falling", "rejection", "local-move", "growth", "insertion", "overlapping", "file"]
 # Keys that only some methods have.
@@ -113,10 +113,7 @@ class Packing(Table):
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
         raw, method = given.raw, given.good.get("method")
-        for name, methods in METHODS_OF.items() if method else ():
-            if name in raw and method not in methods:
-                words = " or ".join(f'"{one}"' for one in methods)
-                yield Mistake((name,), f'is no key of method = "{method}"', f"Leave it out, or write method = {words}")
+        yield from misplaced(given, "method", METHODS_OF)
         if "stage" in raw and not is_result_file(str(raw.get("file", ""))):
             yield Mistake(("stage",), "is a key for result files", "Leave it out, or write the name of one as file")
         if method == "file" and "file" not in raw:

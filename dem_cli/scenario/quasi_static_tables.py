@@ -17,7 +17,7 @@ from dem_cli.scenario.quantities import (
     Stiffness,
     Whole,
 )
-from dem_cli.scenario.table import Given, Mistake, Table, key
+from dem_cli.scenario.table import Given, Mistake, Table, key, misplaced
 from dem_cli.scenario.tables import Followed, WallFriction
 
 EXPLICIT = "explicit"
@@ -91,11 +91,7 @@ class Boundary(Table):
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
-        raw, kind = given.raw, given.good.get("kind")
-        for name, kinds in BOUNDARIES_OF.items() if kind else ():
-            if name in raw and kind not in kinds:
-                words = " or ".join(f'"{one}"' for one in kinds)
-                yield Mistake((name,), f'is no key of kind = "{kind}"', f"Leave it out, or write kind = {words}")
+        yield from misplaced(given, "kind", BOUNDARIES_OF)
 
     @classmethod
     def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:

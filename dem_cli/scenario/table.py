@@ -52,6 +52,17 @@ def did_you_mean(word: str, known: list[str]) -> str:
     return f'Did you mean "{near}"?' if near else f"Known here: {', '.join(known)}"
 
 
+def misplaced(given: Given, chooser: str, owners: Mapping[str, Sequence[str]]) -> Iterator[Mistake]:
+    """A mistake for each key that is written but belongs to other values of the key `chooser`; owners: key -> the values that have it."""
+    chosen = given.good.get(chooser)
+    for name, choices in owners.items() if chosen else ():
+        if name in given.raw and chosen not in choices:
+            words = " or ".join(f'"{one}"' for one in choices)
+            yield Mistake(
+                (name,), f'is no key of {chooser} = "{chosen}"', f"Leave it out, or write {chooser} = {words}"
+            )
+
+
 def key(default: Any = ..., doc: str = "", *, example: Any = None, alias: str | None = None, maker: Any = None) -> Any:
     """A key of a table: its default as a user would write it, its meaning, and an example of a value.
 

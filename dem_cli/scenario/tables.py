@@ -29,7 +29,7 @@ from dem_cli.scenario.quantities import (
 from dem_cli.scenario.radii import Radius
 from dem_cli.scenario.restitution import Tension, damping_ratio
 from dem_cli.scenario.shapes import AspectRatio, Bond, Orientation, Template
-from dem_cli.scenario.table import Given, Mistake, Table, key
+from dem_cli.scenario.table import Given, Mistake, Table, key, misplaced
 
 Ratio = Annotated[float, Number(ge=0.0)]
 Share = Annotated[float, Number(ge=0.0, lt=1.0)]
@@ -89,19 +89,14 @@ class Grains(Table):
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
-        raw, good = given
+        good = given.good
         count, radius = good.get("count"), good.get("radius")
         if radius and radius.number and count is not None and count != radius.number:
             whose = "radii of the list" if radius.sizes else "grains of the classes"
             yield Mistake(
                 ("count",), f"differs from the {radius.number} {whose}", "Leave count out, or make them agree"
             )
-        for name in SHAPES_OF if "shape" in good else ():
-            if name in raw and good["shape"] not in SHAPES_OF[name]:
-                shapes = " or ".join(f'"{shape}"' for shape in SHAPES_OF[name])
-                yield Mistake(
-                    (name,), f'is no key of shape = "{good["shape"]}"', f"Leave it out, or write shape = {shapes}"
-                )
+        yield from misplaced(given, "shape", SHAPES_OF)
 
     @classmethod
     def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:

@@ -99,6 +99,27 @@ class NotFiniteError(ArithmeticError):
     """A fixing force is not a finite number; args: the disc."""
 
 
+@dataclass(frozen=True)
+class Way:
+    """How the last sub-step went, from which the next one is guessed: strain (2,) [m]: prescribed growth of the half sizes, servo (2,) [m]:
+    what the servos added, moves (n, 3) [m] of the discs.
+    """
+
+    strain: Floats
+    servo: Floats
+    moves: Floats
+
+    def alike(self, strain: Floats) -> bool:
+        """Whether this sub-step goes on in the same way."""
+        return bool(np.abs(strain - self.strain).max() <= 0.01 * np.abs(self.strain).max(initial=0.0))
+
+    def of(self, sample: Sample, before: View, goal: Floats) -> Floats:
+        """Moves for a sub-step to `goal`: those of the last one; of discs that nothing holds, the affine ones."""
+        affine = np.zeros_like(self.moves)
+        affine[:, :2] = (sample.x[:, :2] - sample.box[:2]) * (goal / sample.box[2:] - 1.0)
+        return np.where((before.room.touching > 1)[:, None], self.moves, affine)
+
+
 def _iterate(
     sample: Sample,
     goal: Floats,
@@ -129,22 +150,27 @@ def _iterate(
 
 
 def quiet_step(
-    sample: Sample, goal: Floats, servos: Servos, solver: Solver, usual: float, guess: Floats = NO_GUESS
+    sample: Sample, goal: Floats, servos: Servos, solver: Solver, usual: float, way: Way | None = None
 ) -> Done | None:
-    """A sub-step along a smooth path; None where it finds no equilibrium near by. usual [J]: work of such a sub-step.
+    """A sub-step along a smooth path; None, and the sample as it was, where it finds no equilibrium near by.
 
-    The sample is left where it came to.
+    usual [J]: work of such a sub-step; way: of one like it, from which this one is guessed.
     """
     done, before = Done(sub_steps=1), sample.copy()
     start = before.look()
+    guess = NO_GUESS
+    if way is not None:
+        guess, goal = way.of(sample, start, goal), goal + way.servo
     affine = float(np.abs(goal - sample.box[2:]).max())
     far = max(FAR * affine, NEAR_BY * float(sample.bodies.radius.mean()))
-    if not _iterate(sample, goal, servos, solver.quiet(len(sample.x), far), done, np.zeros(LEDGER), guess):
-        return None
-    end = sample.look()
-    lose(sample.near)
-    _settle_up(before, sample, start, end, done, follow=None)
-    return done if abs(done.residual) <= AMISS * usual else None
+    if _iterate(sample, goal, servos, solver.quiet(len(sample.x), far), done, np.zeros(LEDGER), guess):
+        end = sample.look()
+        lose(sample.near)
+        _settle_up(before, sample, start, end, done, follow=None)
+        if abs(done.residual) <= AMISS * usual:
+            return done
+    sample.restore(before)
+    return None
 
 
 def collapse_step(
@@ -158,27 +184,6 @@ def collapse_step(
     return done
 
 
-@dataclass(frozen=True)
-class Way:
-    """How the last sub-step went, from which the next one is guessed: strain (2,) [m]: prescribed growth of the half sizes, servo (2,) [m]:
-    what the servos added, moves (n, 3) [m] of the discs.
-    """
-
-    strain: Floats
-    servo: Floats
-    moves: Floats
-
-    def alike(self, strain: Floats) -> bool:
-        """Whether this sub-step goes on in the same way."""
-        return bool(np.abs(strain - self.strain).max() <= 0.01 * np.abs(self.strain).max(initial=0.0))
-
-    def of(self, sample: Sample, before: View, goal: Floats) -> Floats:
-        """Moves for a sub-step to `goal`: those of the last one; of discs that nothing holds, the affine ones."""
-        affine = np.zeros_like(self.moves)
-        affine[:, :2] = (sample.x[:, :2] - sample.box[:2]) * (goal / sample.box[2:] - 1.0)
-        return np.where((before.room.touching > 1)[:, None], self.moves, affine)
-
-
 def sub_step(
     sample: Sample, goal: Floats, servos: Servos, solver: Solver, usual: float, way: Way | None = None
 ) -> tuple[Done, Way | None]:
@@ -187,29 +192,26 @@ def sub_step(
     way: of the last sub-step, if that was alike. Returns it for the next one; None after a collapse.
     """
     sample.begin()
-    before = sample.copy()
     if not solver.momentum:
-        return _kishino_step(sample, before, goal, servos, solver, usual), None
-    strain = goal - sample.box[2:]
-    if way is None or not way.alike(strain):
-        done = quiet_step(sample, goal, servos, solver, usual)
-    else:
-        done = quiet_step(sample, goal + way.servo, servos, solver, usual, way.of(sample, before.look(), goal))
+        return _kishino_step(sample, goal, servos, solver, usual), None
+    strain, began = goal - sample.box[2:], sample.x.copy()
+    alike = way if way is not None and way.alike(strain) else None
+    done = quiet_step(sample, goal, servos, solver, usual, alike)
     if done is not None:
-        return done, Way(strain, sample.box[2:] - goal, sample.x - before.x)
-    sample.restore(before)
+        return done, Way(strain, sample.box[2:] - goal, sample.x - began)
     done = collapse_step(sample, goal, servos, solver)
     done.event = True
     done.rung += 1
     return done, None
 
 
-def _kishino_step(sample: Sample, before: Sample, goal: Floats, servos: Servos, solver: Solver, usual: float) -> Done:
+def _kishino_step(sample: Sample, goal: Floats, servos: Servos, solver: Solver, usual: float) -> Done:
     """The paper's step: the strain, equilibrium under it, then the stresses (section 2 (6)).
 
     Its ledger is that of (25)-(29); what that misses in a collapse counts as released.
     """
-    done, start = Done(sub_steps=1), before.look()
+    done, before = Done(sub_steps=1), sample.copy()
+    start = before.look()
     paces = [solver.pace(len(sample.x), solver.alpha, 0.0, solver.most, follow=True)]
     done.balanced = _iterate(sample, goal, no_servos(), paces, done, np.zeros(LEDGER))
     if servos.number:
