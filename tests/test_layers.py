@@ -19,19 +19,20 @@ LONGEST = 400
 # A layer is a file or folder of dem_cli; it imports itself and those named here, and nothing else of dem_cli.
 # cli > sweep > run > (assembly, engines, results) > (scenario, state) > errors, and report > (results, analysis).
 BASE = {"errors", "units"}
-STARTS = BASE | {"scenario", "state"}
+STARTS = BASE | {"scenario", "state", "rigid"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "jit": set(),
     "units": {"errors"},
     "state": {"errors"},
+    "rigid": {"state"},
     "scenario": BASE | {"geometry"},
     "geometry": {"jit"},
     "assembly": STARTS | {"geometry", "jit"},
     "engines": STARTS | {"assembly", "geometry", "jit"},
     "results": STARTS,
-    "analysis": {"errors", "state", "geometry", "jit"},
-    "report": BASE | {"results", "analysis", "state"},
+    "analysis": {"errors", "state", "rigid", "geometry", "jit"},
+    "report": BASE | {"results", "analysis", "state", "rigid"},
     "interrupts": set(),
     "run": STARTS | {"assembly", "engines", "results", "analysis", "interrupts"},
     "sweep": STARTS | {"run", "results"},
@@ -49,7 +50,7 @@ KERNEL_FILES_MAY_IMPORT = {
 KERNEL_FILES_MAY_IMPORT_FROM_OUTSIDE = {
     "__future__", "collections", "dataclasses", "llvmlite", "math", "numba", "numpy", "operator", "typing",
 }  # fmt: skip
-NOT_IN_KERNELS = {"Grains", "Contacts", "Walls", "Frame", "Energy", "Scenario", "open", "print"}
+NOT_IN_KERNELS = {"Grains", "Bodies", "Scene", "Contacts", "Walls", "Frame", "Energy", "Scenario", "open", "print"}
 
 MODULES = {
     ".".join(("dem_cli", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__"): path
