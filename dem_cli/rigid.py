@@ -77,8 +77,11 @@ class Bodies:
 
 @dataclass(frozen=True)
 class Planes:
-    """Floors, walls and slopes without end, first axis (w,): name, point (w, 3) [m] on it, unit normal (w, 3) to the side of the bodies,
-    material [-]: index into `Scene.materials`. edge (w, 4, 3) [m]: corners of the piece that pictures show, anticlockwise seen from the bodies."""
+    """Floors, walls and slopes without end, first axis (w,).
+
+    name, point (w, 3) [m] on it, unit normal (w, 3) to the side of the bodies, material [-]: index into `Scene.materials`, edge (w, 4, 3) [m]:
+    corners of the piece that pictures show, anticlockwise seen from the bodies.
+    """
 
     name: tuple[str, ...]
     point: Floats
@@ -106,8 +109,8 @@ class Scene:
     """Bodies at the start, and what does not move.
 
     groups: names of the kinds of bodies, in the order of `Bodies.group`. materials: names; restitution, friction (m, m) [-]: of each pair,
-    symmetric. terrain: None where there is none; contacts call it wall number len(planes). low, high (3,) [m]: corners of the box outside which a
-    body counts as escaped, infinite where there is no end. warnings: what assembling had to tell.
+    symmetric. terrain: None where there is none; contacts call it wall number len(planes). low, high (3,) [m]: corners of the box outside which
+    a body counts as escaped, infinite where there is no end. warnings: what assembling had to tell.
     """
 
     groups: tuple[str, ...]
@@ -175,9 +178,9 @@ class ImpulseEnergy:
 class Solving:
     """What the solvers did since the row of the series before, and caps since the start.
 
-    steps [-]; impacts: steps x islands that had an impact to solve; impact_iterations, load_sweeps: mean of a step (sum over islands), most: largest of
-    one solve; capped: solves that hit a cap of iterations, since the start of the run; residual [m/s]: largest that a solve ended with;
-    islands, largest_island [-]: groups of bodies that touch, and contacts of the largest, in the last step.
+    steps [-]; impacts: steps x islands that had an impact to solve; impact_iterations, load_sweeps: mean of a step (sum over islands);
+    most: largest of one solve; capped: solves that hit a cap of iterations, since the start of the run; residual [m/s]: largest that a solve
+    ended with; islands, largest_island [-]: groups of bodies that touch, and contacts of the largest, in the last step.
     """
 
     steps: int = 0
@@ -195,10 +198,10 @@ class Solving:
 class BodyFrame:
     """The state at one instant of an impulse run, made by the engine and read by measures and writers.
 
-    step [-], time [s], dt [s], stage (0-based). ground (3, 3): displacement [m], velocity [m/s] and acceleration [m/s^2] of the container, x, y, z
-    each; bodies are in the container's frame. contacts: of the last step, whose middle is half a step before the positions; None in a frame that is
-    due for tracks only. residual [J]: what the ledger cannot account for (rotation of bodies in free flight); energy_in [J]: what was
-    put in so far (kinetic energy at the start, potential energy set free, positive work). due, stage_start, stage_end, stop_reason, warnings as
+    step [-], time [s], dt [s], stage (0-based). ground (3, 3): displacement [m], velocity [m/s] and acceleration [m/s^2] of the container,
+    x, y, z each; bodies are in the container's frame. contacts: of the last step, whose middle is half a step before the positions; None in a
+    frame that is due for tracks only. residual [J]: what the ledger cannot account for (rotation of bodies in free flight); energy_in [J]:
+    what was put in so far (kinetic energy at the start, potential energy set free, positive work). due, stage_start, stage_end, stop_reason, warnings as
     in `state.Frame`.
     """
 
