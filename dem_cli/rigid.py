@@ -201,8 +201,8 @@ class BodyFrame:
     step [-], time [s], dt [s], stage (0-based). ground (3, 3): displacement [m], velocity [m/s] and acceleration [m/s^2] of the container,
     x, y, z each; bodies are in the container's frame. contacts: of the last step, whose middle is half a step before the positions; None in a
     frame that is due for tracks only. residual [J]: what the ledger cannot account for (rotation of bodies in free flight); energy_in [J]:
-    what was put in so far (kinetic energy at the start, potential energy set free, positive work). due, stage_start, stage_end, stop_reason, warnings as
-    in `state.Frame`.
+    what was put in so far (kinetic energy at the start, potential energy set free, positive work). due, stage_start, stage_end, stop_reason,
+    warnings as in `state.Frame`.
     """
 
     step: int
