@@ -38,7 +38,7 @@ def solid_of(shape: Shape, fine: int) -> Solid:
         )
     vertices, triangles = shape.vertices.reshape(-1, 3), shape.triangles.reshape(-1, 3)
     if len(triangles) == 0:
-        vertices, triangles = _hull(shape.points)
+        vertices, triangles = hull(shape.points)
     corners = vertices[triangles]
     normals = _unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
     edges, beside = (
@@ -132,7 +132,7 @@ def _inside_another(triangles: Floats, shape: Shape) -> np.ndarray[tuple[int], n
     return hidden
 
 
-def _hull(points: Floats) -> tuple[Floats, Ints]:
+def hull(points: Floats) -> tuple[Floats, Ints]:
     """Convex hull of points (p, 3), triangles anticlockwise seen from outside; nothing for fewer than four, or flat ones."""
     from scipy.spatial import ConvexHull, QhullError
 
