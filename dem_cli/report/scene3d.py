@@ -27,7 +27,10 @@ EARTH = np.array([0.80, 0.77, 0.71])
 FLOOR = "#EEF0F2"
 INK = "0.25"
 RASTER_ABOVE = 8_000  # polygons of a vector picture
-FINE = 40_000  # triangles of all bodies together that a picture may have
+FINE = (
+    (3, 40_000),
+    (2, 250_000),
+)  # subdivisions of spheres, and the triangles of all bodies together that they may make
 LINES = 12  # of a grid along the longer side of a plane, at most
 CHAIN = "#B2182B"
 
@@ -185,8 +188,8 @@ def _paint_bodies(
     found = []
     for k, some in by_shape(bodies, shown):
         shape = shapes[k]
-        each = 1280 * max(1, len(shape.radii)) if shape.kind == "spheres" else 0
-        fine = 3 if len(bodies) * each < FINE else 2 if len(bodies) * each < 8 * FINE else 1
+        spheres = len(bodies) * len(shape.radii)
+        fine = next((level for level, most in FINE if 20 * 4**level * spheres <= most), 1)
         solid = solid_of(shape, fine if shape.kind == "spheres" else (2 if len(bodies) < 2000 else 1))
         matrix, scale, x = rotation(bodies.q[some]), bodies.scale[some], bodies.x[some]
 
