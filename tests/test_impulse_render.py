@@ -25,6 +25,7 @@ from dem_cli.report.look import style
 from dem_cli.report.scene3d import grid_lines, grid_step, view_of
 from dem_cli.report.solids import icosphere, sharp_edges, solid_of, subdivided
 from dem_cli.results import BodyResults, open_results
+from dem_cli.rigid import Terrain
 
 
 @pytest.fixture(scope="module")
@@ -124,6 +125,7 @@ def test_solid_of_a_clump_and_of_a_cloud() -> None:
         ).sum()
     )
     assert area == pytest.approx(6.0)
+    assert np.einsum("tk,tk->t", hull.normals, hull.triangles.mean(axis=1)).min() > 0.4
 
 
 def test_subdivision_keeps_the_area() -> None:
@@ -157,7 +159,7 @@ def test_grid() -> None:
 def test_polygons_lie_where_the_bodies_are(tmp_path: Path) -> None:
     """A turned box and a pair, from the front: their outline on the page is that of their corners and spheres."""
     shapes = (box_shape((2.0, 1.0, 1.0)), pair_shape(0.5))
-    q = [axis_angle([0, 1, 0], 0.25 * np.pi), [1.0, 0, 0, 0]]
+    q = [axis_angle([0, 1, 0], np.radians(30.0)), [1.0, 0, 0, 0]]  # the end at +x goes down
     bodies = bodies_at([[0, 0, 3], [5, 0, 1]], shapes, [0, 1], q=q)
     path = made.write_run(
         tmp_path / "a.h5", scene_of(bodies, shapes), [(0.0, bodies), (0.1, bodies)], dt=0.1, every=(1, 1, 1)
@@ -166,8 +168,9 @@ def test_polygons_lie_where_the_bodies_are(tmp_path: Path) -> None:
         found = polygons(drawn(results, what="scene", view=(-90.0, 0.0)))
     corners = np.concatenate([p.vertices for p in found.get_paths()])
     box = corners[corners[:, 0] < 2.5]
-    reach = 1.5 * np.sqrt(0.5)
-    assert (box.min(axis=0), box.max(axis=0)) == (pytest.approx([-reach, 3 - reach]), pytest.approx([reach, 3 + reach]))
+    right, up = np.sqrt(0.75) + 0.25, 0.5 + 0.5 * np.sqrt(0.75)
+    assert (box.min(axis=0), box.max(axis=0)) == (pytest.approx([-right, 3 - up]), pytest.approx([right, 3 + up]))
+    assert box[np.argmax(box[:, 0])] == pytest.approx([right, 3 - 0.5 + 0.5 * np.sqrt(0.75)])
     pair = corners[corners[:, 0] > 2.5]
     assert (pair.min(axis=0), pair.max(axis=0)) == (
         pytest.approx([4.0, 0.5], abs=0.01),
@@ -202,20 +205,26 @@ def test_escaped_bodies_are_not_drawn(rocks: BodyResults) -> None:
 
 
 def test_a_body_on_the_terrain_is_before_it(tmp_path: Path) -> None:
-    """Wherever it lies on coarse triangles: some of each body is painted after all of the terrain around it."""
-    shapes = (box_shape((0.5, 0.5, 0.5)),)
-    hill = made.hill()
-    level = [[x, 6.3, 0.25] for x in np.linspace(22.0, 38.0, 9)]
+    """Wherever it lies on coarse triangles its top is seen."""
+    shapes = (box_shape((0.5, 0.5, 0.2)),)
+    field = Terrain(
+        "field", np.array([[0.0, 0, 0], [16, 0, 0], [16, 16, 0], [0, 16, 0]]), np.array([[0, 1, 2], [0, 2, 3]]), 1
+    )
+    level = [[x, y, 0.1] for x in np.arange(1.0, 16.0, 1.3) for y in np.arange(1.0, 16.0, 1.7)]
     bodies = bodies_at(level, shapes)
     path = made.write_run(
-        tmp_path / "a.h5", scene_of(bodies, shapes, None, hill), [(0.0, bodies), (0.1, bodies)], dt=0.1, every=(1, 1, 1)
+        tmp_path / "a.h5",
+        scene_of(bodies, shapes, None, field),
+        [(0.0, bodies), (0.1, bodies)],
+        dt=0.1,
+        every=(1, 1, 1),
     )
     with opened(path) as results:
-        figure = drawn(results, what="scene", color="id")
+        figure = drawn(results, what="scene", color="kind")
         image = pixels(figure, tmp_path)
         camera = Camera.at(-62.0, 24.0)
         for place in level:
-            at = figure.axes[0].transData.transform(camera.screen(np.add(place, [0, 0, 0.25]))) / figure.dpi * 40
+            at = figure.axes[0].transData.transform(camera.screen(np.add(place, [0, 0, 0.1]))) / figure.dpi * 40
             found = image[image.shape[0] - 1 - round(at[1]), round(at[0])]
             assert np.ptp(found / found.max()) > 0.12, place  # earth is nearly grey
 
