@@ -42,7 +42,9 @@ def back_to(first, last, i, j, velocity, before, impulse):
 
 @kernel()
 def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, start, tolerance, most):
-    """Blends an impact that gained energy with one without restitution, so that none is gained; returns sweeps and residual of the latter.
+    """Blends an impact that gained energy with one without restitution, so that none is gained.
+
+    Returns sweeps, residual and whether that is enough, of the latter.
 
     The solution with e = 0 loses energy, half-spaces and friction cones are convex, so every blend J_0 + s (J_e - J_0) is admissible; s is the
     largest that gains nothing. Where even e = 0 gains energy, as friction that feeds the approach keeps it from ending, friction is left out.
@@ -57,15 +59,15 @@ def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, st
             after[c - first, axis] = u[axis]
         rows[c, TARGET] = 0.0
     back_to(first, last, i, j, velocity, before, impulse)
-    sweeps, residual = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
+    sweeps, residual, done = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
     gain_0, exchanged = work_done(first, last, i, j, rows, velocity, impulse, start)
     if gain_0 > GAIN * exchanged:
         friction = rows[first:last, FRICTION].copy()
         rows[first:last, FRICTION] = 0.0
         back_to(first, last, i, j, velocity, before, impulse)
-        more, _ = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
+        more, _, done = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
         rows[first:last, FRICTION] = friction
-        return sweeps + more, residual
+        return sweeps + more, residual, done
     square = 0.0
     for c in range(first, last):
         u = relative(rows[c], velocity[i[c]], velocity[j[c]])
@@ -84,7 +86,7 @@ def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, st
     for c in range(first, last):
         impulse[c] = blended[c - first]
         push(rows[c], vector(impulse[c], 0), velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
-    return sweeps, residual
+    return sweeps, residual, done
 
 
 @kernel()
@@ -107,23 +109,25 @@ def solve_impact(
         rows[c, TARGET] = rows[c, RESTITUTION] * approach if approach > rest_speed else 0.0
     if fastest <= rest_speed:
         return 0, 0.0, False
-    iterations, residual = 0, math.inf
+    iterations, residual, done = 0, math.inf, False
     if method == PGS:
-        iterations, residual = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
-    if method == TRACKING or (residual > tolerance and last - first <= SMALL):
+        iterations, residual, done = sweep_until_still(
+            first, last, i, j, rows, velocity, inverse, impulse, tolerance, most
+        )
+    if method == TRACKING or (not done and last - first <= SMALL):
         back_to(first, last, i, j, velocity, before, impulse)
         more, residual = track_energy(
             first, last, i, j, rows, velocity, inverse, impulse, head, following, quanta, tolerance, most_quanta
         )
-        iterations += more
-    capped = residual > tolerance
+        iterations, done = iterations + more, residual <= tolerance
     gained, exchanged = work_done(first, last, i, j, rows, velocity, impulse, start)
-    if gained > GAIN * exchanged or (capped and method == TRACKING):
-        more, left = guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, start, tolerance, most)
-        iterations += more
-        residual = max(residual, left)
+    if gained > GAIN * exchanged or (not done and method == TRACKING):
+        more, left, ended = guard_energy(
+            first, last, i, j, rows, velocity, inverse, impulse, before, start, tolerance, most
+        )
+        iterations, residual, done = iterations + more, max(residual, left), done and ended
     for c in range(first, last):
         along = dot(relative(rows[c], velocity[i[c]], velocity[j[c]]), vector(rows[c], NORMAL))
         met = dot(vector(impulse[c], 0), vector(rows[c], NORMAL)) > 0.0
         rows[c, TARGET] = max(0.0, along) if met else 0.0
-    return iterations, residual, capped or residual > tolerance
+    return iterations, residual, not done

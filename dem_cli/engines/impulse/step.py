@@ -217,11 +217,10 @@ def solve_load(starts, i, j, rows, velocity, inverse, load, rules, counts):
             saved[c - first, 6:] = velocity[j[c]]
         for c in range(first, last):
             push(rows[c], vector(load[c], 0), velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
-        sweeps, residual = sweep_until_still(
+        sweeps, residual, done = sweep_until_still(
             first, last, i, j, rows, velocity, inverse, load, rules.tolerance, rules.most
         )
-        capped = residual > rules.tolerance
-        if capped:
+        if not done:
             gained, exchanged = 0.0, 0.0
             for c in range(first, last):
                 one, u = vector(load[c], 0), relative(rows[c], velocity[i[c]], velocity[j[c]])
@@ -235,12 +234,12 @@ def solve_load(starts, i, j, rows, velocity, inverse, load, rules, counts):
                     velocity[i[c]] = saved[c - first, :6]
                     velocity[j[c]] = saved[c - first, 6:]
                     load[c] = 0.0
-                more, _ = sweep_until_still(
+                more, _, _ = sweep_until_still(
                     first, last, i, j, rows, velocity, inverse, load, rules.tolerance, rules.most
                 )
                 rows[first:last, FRICTION] = friction
                 sweeps += more
-        note(counts, LOAD_SWEEPS, sweeps, residual, capped)
+        note(counts, LOAD_SWEEPS, sweeps, residual, not done)
 
 
 @kernel()
