@@ -20,7 +20,7 @@ from dem_cli.errors import RunError
 from dem_cli.interrupts import marked_interrupts
 from dem_cli.results import ResultWriter
 from dem_cli.results.files import check_target
-from dem_cli.scenario import AnyScenario, QuasiStaticScenario, Scenario, Shake
+from dem_cli.scenario import DiscScenario, QuasiStaticScenario, Scenario, Shake
 from dem_cli.state import Bonds, Frame, Grains, Increment, Ints, Walls
 
 # Told of every frame, with its row of the series where it has one, and of every increment, with its row.
@@ -117,7 +117,7 @@ def run_increments(
 
 
 def begin(
-    scenario: AnyScenario, target: Path, force: bool, grains: Grains, walls: Walls, container: Mapping[str, float | None], *,
+    scenario: DiscScenario, target: Path, force: bool, grains: Grains, walls: Walls, container: Mapping[str, float | None], *,
     tracks: Ints | None, surface_x: Any = None, bonds: Bonds | None = None, boundary: int = 0,
 ) -> ResultWriter:  # fmt: skip
     """A result file of the scenario, with nothing in it yet."""

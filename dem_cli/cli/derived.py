@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_cli.scenario import AnyScenario, Scenario, Settle, Shake
+from dem_cli.scenario import DiscScenario, Scenario, Settle, Shake
 from dem_cli.scenario.packing import USUAL
 from dem_cli.scenario.restitution import restitution
 from dem_cli.state import Floats
@@ -200,7 +200,7 @@ def _packing_height(scenario: Scenario, mass: float) -> float | None:
     return packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
 
 
-def packing_seconds(scenario: AnyScenario, grains: int) -> float:
+def packing_seconds(scenario: DiscScenario, grains: int) -> float:
     """Time that the packing itself takes [s], a guess."""
     if not scenario.packing.random:
         return 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from dem_cli.scenario.base import AnyScenario, grid_fits, largest_fits
+from dem_cli.scenario.base import DiscScenario, grid_fits, largest_fits
 from dem_cli.scenario.packing import Packing
 from dem_cli.scenario.quantities import JsonSchema
 from dem_cli.scenario.stages import STAGES, Stage
@@ -16,7 +16,7 @@ from dem_cli.scenario.tables import Contact, Container, Grains, Integration, Out
 QUASI_STATIC = "granular-element"
 
 
-class Scenario(AnyScenario):
+class Scenario(DiscScenario):
     """A scenario of explicit DEM, complete and consistent: every default filled in, every rule checked."""
 
     engine: Literal["explicit"] = key(

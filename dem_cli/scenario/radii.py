@@ -24,6 +24,8 @@ class Normal(Table):
     min: Length = key(doc="smallest radius", example="5 mm")
     max: Length = key(doc="largest radius", example="10 mm")
 
+    unit: ClassVar[str] = " m"
+
     @property
     def share(self) -> float:
         """Probability of the window from min to max."""
@@ -36,7 +38,7 @@ class Normal(Table):
         if not {"min", "max"} <= good.keys():
             return
         if good["min"] >= good["max"]:
-            yield Mistake(("min",), "must be smaller than max", f"Swap them, or raise max above {good['min']:g} m")
+            yield Mistake(("min",), "must be smaller than max", f"Swap them, or raise max above {good['min']:g}{cls.unit}")
         elif {"mean", "sd"} <= good.keys() and (share := cls.model_construct(**good).share) < 0.01:
             rule = f"leaves, up to max, only {share:.1g} of the normal distribution; 0.01 is the least"
             yield Mistake(("min",), rule, "Widen the window, or move mean into it")
