@@ -1,0 +1,120 @@
+"""Vectors of three numbers and turns of nine (row by row) as tuples, for kernels."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from dem_cli.jit import kernel
+
+
+class Placed(NamedTuple):
+    """Where bodies are: x (n, 3) [m], turn (n, 9): matrix from the shape's frame to the container's, scale, reach [m] (n,), shape (n,).
+
+    The terrain, where there is one, is the last.
+    """
+
+    x: np.ndarray
+    turn: np.ndarray
+    scale: np.ndarray
+    reach: np.ndarray
+    shape: np.ndarray
+
+
+@kernel(inline=True)
+def row(a, k):
+    return a[k, 0], a[k, 1], a[k, 2]
+
+
+@kernel(inline=True)
+def add(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel(inline=True)
+def sub(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel(inline=True)
+def times(a, s):
+    return a[0] * s, a[1] * s, a[2] * s
+
+
+@kernel(inline=True)
+def along(a, d, s):
+    """a + s d"""
+    return a[0] + d[0] * s, a[1] + d[1] * s, a[2] + d[2] * s
+
+
+@kernel(inline=True)
+def dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel(inline=True)
+def cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel(inline=True)
+def turned(m, v):
+    """m v"""
+    return (
+        m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+        m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+        m[6] * v[0] + m[7] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel(inline=True)
+def turned_back(m, v):
+    """m^T v"""
+    return (
+        m[0] * v[0] + m[3] * v[1] + m[6] * v[2],
+        m[1] * v[0] + m[4] * v[1] + m[7] * v[2],
+        m[2] * v[0] + m[5] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel(inline=True)
+def turn_of(placed, i):
+    t = placed.turn
+    return t[i, 0], t[i, 1], t[i, 2], t[i, 3], t[i, 4], t[i, 5], t[i, 6], t[i, 7], t[i, 8]
+
+
+@kernel(inline=True)
+def to_world(placed, i, p):
+    """Place of a point of body i's frame of scale 1."""
+    return along(row(placed.x, i), turned(turn_of(placed, i), p), placed.scale[i])
+
+
+@kernel()
+def relative(placed, a, b):
+    """Body a's frame seen from body b's, both of scale 1: (m (9,), t (3,), f) with p_b = f m p_a + t."""
+    ta, tb = turn_of(placed, a), turn_of(placed, b)
+    x = turned_back(tb, (ta[0], ta[3], ta[6]))
+    y = turned_back(tb, (ta[1], ta[4], ta[7]))
+    z = turned_back(tb, (ta[2], ta[5], ta[8]))
+    m = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+    t = times(turned_back(tb, sub(row(placed.x, a), row(placed.x, b))), 1.0 / placed.scale[b])
+    return m, t, placed.scale[a] / placed.scale[b]
+
+
+@kernel(inline=True)
+def placed_at(relation, p):
+    """Point p of a's frame in b's, of the `relative` of a and b."""
+    return along(relation[1], turned(relation[0], p), relation[2])
+
+
+@kernel()
+def set_turns(placed, x, q, n):
+    """Write x (n, 3) and the matrices of the quaternions q (n, 4) of the first n bodies into `placed`."""
+    for i in range(n):
+        w, a, b, c = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        t = placed.turn
+        t[i, 0], t[i, 1], t[i, 2] = 1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b)
+        t[i, 3], t[i, 4], t[i, 5] = 2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a)
+        t[i, 6], t[i, 7], t[i, 8] = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)
+        placed.x[i, 0], placed.x[i, 1], placed.x[i, 2] = x[i, 0], x[i, 1], x[i, 2]
