@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dem_cli.engines.impulse.vectors import after_turn, turned, turned_back
+from dem_cli.engines.impulse.quaternions import after_turn, turned, turned_back
 from dem_cli.jit import kernel
 
 

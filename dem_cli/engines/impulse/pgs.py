@@ -19,7 +19,8 @@ from dem_cli.engines.impulse.rows import (
     symmetric,
     vector,
 )
-from dem_cli.engines.impulse.vectors import dot, plus, scaled, symmetric_times
+from dem_cli.engines.impulse.symmetric import symmetric_times
+from dem_cli.engines.impulse.vectors import dot, plus, scaled
 from dem_cli.jit import kernel
 
 SMALL, FINE = (

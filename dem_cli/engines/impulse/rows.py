@@ -7,7 +7,8 @@ acts on j at p and -J on i, so that u changes by K J, K = (1/m_i + 1/m_j) 1 - [r
 
 from __future__ import annotations
 
-from dem_cli.engines.impulse.vectors import across, cross, dot, plus, scaled, symmetric_inverse, symmetric_times
+from dem_cli.engines.impulse.symmetric import symmetric_inverse, symmetric_times
+from dem_cli.engines.impulse.vectors import across, cross, dot, plus, scaled
 from dem_cli.jit import kernel
 
 # Columns of a row: arms, normal, K and its inverse (xx, yy, zz, xy, xz, yz), n.K.n, an upper bound of t.K.t, friction,

@@ -16,6 +16,7 @@ import numpy as np
 from dem_cli.engines.impulse.impact import solve_impact
 from dem_cli.engines.impulse.islands import split_islands
 from dem_cli.engines.impulse.pgs import sweep_until_still
+from dem_cli.engines.impulse.quaternions import after_turn
 from dem_cli.engines.impulse.rows import (
     FRICTION,
     NORMAL,
@@ -29,7 +30,7 @@ from dem_cli.engines.impulse.rows import (
     vector,
 )
 from dem_cli.engines.impulse.tracking import link_contacts
-from dem_cli.engines.impulse.vectors import after_turn, dot, scaled
+from dem_cli.engines.impulse.vectors import dot, scaled
 from dem_cli.jit import kernel
 
 PROJECTION_SWEEPS = 10

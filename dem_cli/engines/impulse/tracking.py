@@ -24,7 +24,8 @@ from dem_cli.engines.impulse.rows import (
     symmetric,
     vector,
 )
-from dem_cli.engines.impulse.vectors import dot, plus, scaled, symmetric_times
+from dem_cli.engines.impulse.symmetric import symmetric_times
+from dem_cli.engines.impulse.vectors import dot, plus, scaled
 from dem_cli.jit import kernel
 
 TIE = 1e-6  # contacts this close to the extreme, as a share of the extreme at the start of the phase, are treated together

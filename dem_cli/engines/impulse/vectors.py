@@ -1,13 +1,52 @@
-"""Vectors and symmetric matrices of three dimensions as tuples of numbers, which compiled code keeps in registers.
-
-A symmetric matrix is written xx, yy, zz, xy, xz, yz, in tuples and in the rows of arrays (n, 6).
-"""
+"""Vectors of three numbers and turns of nine (row by row) as tuples, for kernels."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from dem_cli.jit import kernel
+
+
+class Placed(NamedTuple):
+    """Where bodies are: x (n, 3) [m], turn (n, 9): matrix from the shape's frame to the container's, scale, reach [m] (n,), shape (n,).
+
+    The terrain, where there is one, is the last.
+    """
+
+    x: np.ndarray
+    turn: np.ndarray
+    scale: np.ndarray
+    reach: np.ndarray
+    shape: np.ndarray
+
+
+@kernel(inline=True)
+def row(a, k):
+    return a[k, 0], a[k, 1], a[k, 2]
+
+
+@kernel(inline=True)
+def add(a, b):
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+@kernel(inline=True)
+def sub(a, b):
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@kernel(inline=True)
+def times(a, s):
+    return a[0] * s, a[1] * s, a[2] * s
+
+
+@kernel(inline=True)
+def along(a, d, s):
+    """a + s d"""
+    return a[0] + d[0] * s, a[1] + d[1] * s, a[2] + d[2] * s
 
 
 @kernel(inline=True)
@@ -18,6 +57,68 @@ def dot(a, b):
 @kernel(inline=True)
 def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel(inline=True)
+def turned(m, v):
+    """m v"""
+    return (
+        m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+        m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+        m[6] * v[0] + m[7] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel(inline=True)
+def turned_back(m, v):
+    """m^T v"""
+    return (
+        m[0] * v[0] + m[3] * v[1] + m[6] * v[2],
+        m[1] * v[0] + m[4] * v[1] + m[7] * v[2],
+        m[2] * v[0] + m[5] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel(inline=True)
+def turn_of(placed, i):
+    t = placed.turn
+    return t[i, 0], t[i, 1], t[i, 2], t[i, 3], t[i, 4], t[i, 5], t[i, 6], t[i, 7], t[i, 8]
+
+
+@kernel(inline=True)
+def to_world(placed, i, p):
+    """Place of a point of body i's frame of scale 1."""
+    return along(row(placed.x, i), turned(turn_of(placed, i), p), placed.scale[i])
+
+
+@kernel()
+def relative(placed, a, b):
+    """Body a's frame seen from body b's, both of scale 1: (m (9,), t (3,), f) with p_b = f m p_a + t."""
+    ta, tb = turn_of(placed, a), turn_of(placed, b)
+    x = turned_back(tb, (ta[0], ta[3], ta[6]))
+    y = turned_back(tb, (ta[1], ta[4], ta[7]))
+    z = turned_back(tb, (ta[2], ta[5], ta[8]))
+    m = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
+    t = times(turned_back(tb, sub(row(placed.x, a), row(placed.x, b))), 1.0 / placed.scale[b])
+    return m, t, placed.scale[a] / placed.scale[b]
+
+
+@kernel(inline=True)
+def placed_at(relation, p):
+    """Point p of a's frame in b's, of the `relative` of a and b."""
+    return along(relation[1], turned(relation[0], p), relation[2])
+
+
+@kernel()
+def set_turns(placed, x, q, n):
+    """Write x (n, 3) and the matrices of the quaternions q (n, 4) of the first n bodies into `placed`."""
+    for i in range(n):
+        w, a, b, c = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+        t = placed.turn
+        t[i, 0], t[i, 1], t[i, 2] = 1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b)
+        t[i, 3], t[i, 4], t[i, 5] = 2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a)
+        t[i, 6], t[i, 7], t[i, 8] = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)
+        placed.x[i, 0], placed.x[i, 1], placed.x[i, 2] = x[i, 0], x[i, 1], x[i, 2]
 
 
 @kernel(inline=True)
@@ -32,29 +133,6 @@ def scaled(s, a):
 
 
 @kernel(inline=True)
-def symmetric_times(m, a):
-    """The symmetric matrix m times a."""
-    return (
-        m[0] * a[0] + m[3] * a[1] + m[4] * a[2],
-        m[3] * a[0] + m[1] * a[1] + m[5] * a[2],
-        m[4] * a[0] + m[5] * a[1] + m[2] * a[2],
-    )
-
-
-@kernel(inline=True)
-def symmetric_inverse(m):
-    """Inverse of a symmetric positive definite matrix, by cofactors."""
-    xx = m[1] * m[2] - m[5] * m[5]
-    xy = m[5] * m[4] - m[3] * m[2]
-    xz = m[3] * m[5] - m[1] * m[4]
-    over = 1.0 / (m[0] * xx + m[3] * xy + m[4] * xz)
-    yy = m[0] * m[2] - m[4] * m[4]
-    yz = m[3] * m[4] - m[0] * m[5]
-    zz = m[0] * m[1] - m[3] * m[3]
-    return xx * over, yy * over, zz * over, xy * over, xz * over, yz * over
-
-
-@kernel(inline=True)
 def across(n):
     """A unit vector at right angles to the unit vector n."""
     if abs(n[0]) < 0.6:
@@ -62,31 +140,3 @@ def across(n):
         return 0.0, n[2] / length, -n[1] / length
     length = math.sqrt(n[0] * n[0] + n[1] * n[1])
     return n[1] / length, -n[0] / length, 0.0
-
-
-@kernel(inline=True)
-def turned(q, a):
-    """The vector a turned by the unit quaternion q: w, x, y, z."""
-    u = (q[1], q[2], q[3])
-    t = scaled(2.0, cross(u, a))
-    return plus(plus(a, q[0], t), 1.0, cross(u, t))
-
-
-@kernel(inline=True)
-def turned_back(q, a):
-    """The vector a turned by the inverse of the unit quaternion q."""
-    return turned((q[0], -q[1], -q[2], -q[3]), a)
-
-
-@kernel(inline=True)
-def after_turn(q, w, h):
-    """The quaternion q after a turn with angular velocity w [rad/s] over h [s], of unit length."""
-    speed = math.sqrt(dot(w, w))
-    half = 0.5 * h * speed
-    factor = math.sin(half) / speed if speed > 0.0 else 0.5 * h
-    c, s = math.cos(half), scaled(factor, w)
-    v = (q[1], q[2], q[3])
-    first = c * q[0] - dot(s, v)
-    rest = plus(plus(scaled(c, v), q[0], s), 1.0, cross(s, v))
-    over = 1.0 / math.sqrt(first * first + dot(rest, rest))
-    return first * over, rest[0] * over, rest[1] * over, rest[2] * over
