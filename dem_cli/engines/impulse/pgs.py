@@ -23,11 +23,8 @@ from dem_cli.engines.impulse.symmetric import symmetric_times
 from dem_cli.engines.impulse.vectors import dot, plus, scaled
 from dem_cli.jit import kernel
 
-SMALL, FINE = (
-    32,
-    1e-6,
-)  # islands of so few contacts are solved to this share of the tolerance: it costs little, and flat bodies land flat
-
+# Islands of so few contacts are solved to this share of the tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
+SMALL, FINE, FINE_SWEEPS = 64, 1e-7, 500
 ENOUGH = 1e-2  # of the first change: larger islands are not solved to less
 
 
@@ -106,7 +103,7 @@ def sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, toler
         residual = math.sqrt(speeds / contacts)
         if number == 0 and contacts > SMALL:
             aim = max(aim, ENOUGH * residual)
-        if residual <= aim:
+        if residual <= aim or (number + 1 >= FINE_SWEEPS and residual <= tolerance):
             return number + 1, residual, True
         share = energies / before if before > 0.0 else 2.0
         before = energies
