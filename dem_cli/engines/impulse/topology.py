@@ -49,7 +49,7 @@ class Mesh(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Boxes sorted into a grid: origin (3,), cell [m], size (3,); members of cell (x size_1 + y) size_2 + z are member[start[c]:start[c + 1]]."""
+    """Boxes in a grid: origin (3,), cell [m], size (3,); members of cell (x size_1 + y) size_2 + z are member[start[c]:start[c + 1]]."""
 
     origin: Floats
     cell: float
@@ -80,7 +80,9 @@ def _welded(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:
     vertex, triangle = vertices[first[order]], place[number.reshape(-1)[triangles]]
     a, b, c = (vertex[triangle[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0)
+    longest = np.max(
+        [np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], axis=0
+    )
     return vertex, triangle[area > 1e-9 * longest * longest].astype(np.int64)
 
 
