@@ -66,7 +66,9 @@ def cloud_box(size: Sequence[float], many: int) -> Shape:
     points = box(size, many)
     around = np.sort(np.abs(points.points / np.asarray(size)), axis=1)[:, 1]
     spacing = max(size) / many
-    return shape_of("cloud", points=points.points, normals=points.normals, trusted=around < 0.5 - 0.6 / many, spacing=spacing)
+    return shape_of(
+        "cloud", points=points.points, normals=points.normals, trusted=around < 0.5 - 0.6 / many, spacing=spacing
+    )
 
 
 def scene(
@@ -95,9 +97,13 @@ def scene(
         np.zeros(len(planes), np.int64),
         np.zeros((len(planes), 4, 3)),
     )
-    ground = None if terrain is None else Terrain("ground", np.asarray(terrain[0], dtype=float), np.asarray(terrain[1]), 0)
+    ground = (
+        None if terrain is None else Terrain("ground", np.asarray(terrain[0], dtype=float), np.asarray(terrain[1]), 0)
+    )
     ends = np.full(3, np.inf)
-    return Scene(("kind",), tuple(shapes), bodies, walls, ground, ("stone",), np.ones((1, 1)), np.ones((1, 1)), -ends, ends)
+    return Scene(
+        ("kind",), tuple(shapes), bodies, walls, ground, ("stone",), np.ones((1, 1)), np.ones((1, 1)), -ends, ends
+    )
 
 
 def contacts(given: Scene, tolerance: float = TINY) -> Touching:
@@ -127,7 +133,5 @@ def random_turn(random: np.random.Generator) -> Floats:
 def corners_of(given: Scene, i: int) -> Floats:
     """Vertices of body i in the container's frame."""
     bodies = given.bodies
-    places: Floats = (
-        bodies.x[i] + bodies.scale[i] * given.shapes[bodies.shape[i]].vertices @ rotation(bodies.q[i])[0].T
-    )
+    places: Floats = bodies.x[i] + bodies.scale[i] * given.shapes[bodies.shape[i]].vertices @ rotation(bodies.q[i])[0].T
     return places

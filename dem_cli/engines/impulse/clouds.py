@@ -35,6 +35,7 @@ from dem_cli.engines.impulse.vectors import (
 )
 from dem_cli.jit import kernel
 
+ROUND = 1.000001  # particles of a grid are one spacing apart but for rounding
 BESIDE = 0.9  # cosine of the angle between normals of contacts from both sides that are one
 
 
@@ -53,7 +54,7 @@ def _particle_below(shapes, near, p, feature, opposed, relation, limits):
             continue
         d, n = sub(p, row(shapes.point, j, PLACE)), row(shapes.point, j, NORMAL)
         square, height = dot(d, d), dot(d, n)
-        if height > tolerance or height < -depth or square - height * height > spacing * spacing:
+        if height > tolerance or height < -depth or square - height * height > ROUND * spacing * spacing:
             continue
         if square > least or (square == least and j > best):
             continue

@@ -25,6 +25,7 @@ from dem_cli.engines.impulse.arrays import (
     SPACING,
     SPHERE0,
     SPHERES,
+    TRIANGLE0,
     TRIANGLES,
     VERTEX0,
 )
@@ -33,6 +34,7 @@ from dem_cli.engines.impulse.edges import edges_on_edges, keep_least
 from dem_cli.engines.impulse.faces import features_on_faces
 from dem_cli.engines.impulse.found import CORNER_I, POINT_I, SPHERE, key_of, put, sort_pair
 from dem_cli.engines.impulse.near import box_seen, boxes_apart, gather_edges, gather_points, gather_triangles
+from dem_cli.engines.impulse.slab import keep_beyond, overlap_between
 from dem_cli.engines.impulse.spheres import spheres_on_mesh, spheres_on_spheres
 from dem_cli.engines.impulse.vectors import (
     add,
@@ -51,6 +53,7 @@ from dem_cli.jit import kernel
 
 DEPTH = 0.25  # deepest that a point is looked for under a face, over the smaller reach
 BORDER = 1e-6  # how far a point may lie beside a face and still be over it, over the smaller reach
+MANY = 80  # triangles and points of a pair from which on the space where it overlaps is found first
 MERGE = 4e-6  # contacts of one normal that are closer than this are one, over the smaller reach
 
 
@@ -111,47 +114,78 @@ def _gather(shapes, near, s, low, high, tight, wide):
 
 
 @kernel()
+def _gather_both(shapes, placed, nears, rows, to_i, to_j, margins):
+    """Features of both bodies that may touch, into `nears`; margins: (tight, depth, spacing) [m].
+
+    Returns the depth to which contacts are to be looked for [m], -1.0 where the bodies are apart.
+    """
+    (i, j), (tight, depth, spacing) = rows, margins
+    si, sj = placed.shape[i], placed.shape[j]
+    many = 0
+    for column in (TRIANGLE0, POINT0):
+        many += shapes.number[si + 1, column] - shapes.number[si, column]
+        many += shapes.number[sj + 1, column] - shapes.number[sj, column]
+    cut = many > MANY and placed.frame[j, RADIUS] < np.inf
+    n, bottom, top = (0.0, 0.0, 1.0), 0.0, 0.0
+    if cut:
+        n, bottom, top = overlap_between(shapes, placed, i, j, tight + spacing)
+        if bottom - top > tight + spacing:
+            return -1.0
+        # What lies inside the other body is no deeper than this, along -n or n; twice that leaves room for faces at a slant.
+        depth = min(depth, 2.0 * max(top - bottom, 0.0) + tight)
+    wide = tight + depth + spacing
+    # An open surface has an inside that its box does not hold.
+    below = tight if placed.frame[j, RADIUS] < np.inf else wide
+    low, high = box_seen(shapes, sj, to_i)
+    f = 1.0 / placed.frame[i, SCALE]
+    _gather(shapes, nears[0], si, low, high, below * f, wide * f)
+    low, high = box_seen(shapes, si, to_j)
+    f = 1.0 / placed.frame[j, SCALE]
+    _gather(shapes, nears[1], sj, low, high, tight * f, wide * f)
+    if cut:
+        keep_beyond(shapes, placed, nears[0], i, n, bottom - tight - spacing, bottom - wide)
+        keep_beyond(shapes, placed, nears[1], j, times(n, -1.0), -top - tight - spacing, -top - wide)
+    return depth
+
+
+@kernel()
+def _features(shapes, placed, near_a, near_b, relation, found, pair, owner, margins, merge):
+    """Corners and points of body owner[0] on the faces or particles of body owner[1]; margins: (tolerance, depth, border, spacing) [m]."""
+    f = 1.0 / placed.frame[owner[1], SCALE]
+    tolerance, depth, border, spacing = margins
+    if shapes.number[placed.shape[owner[1]], KIND] == POLYHEDRON:
+        limits = (tolerance * f, depth * f, border * f)
+        features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge)
+    else:
+        limits = (tolerance * f, depth * f, spacing * f)
+        features_on_cloud(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge)
+
+
+@kernel()
 def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
     """Contacts of two bodies (rows of `placed`) that are polyhedra or clouds."""
     i, j = rows
     si, sj = placed.shape[i], placed.shape[j]
     to_j, to_i = relative(placed, i, j), relative(placed, j, i)
-    if boxes_apart(shapes, si, sj, to_j, tolerance / placed.frame[j, SCALE]):
-        return
+    fi, fj = placed.frame[i, SCALE], placed.frame[j, SCALE]
+    spacings = shapes.size[si, SPACING] * fi, shapes.size[sj, SPACING] * fj
+    spacing = max(spacings[0], spacings[1])
     reach = min(placed.frame[i, RADIUS], placed.frame[j, RADIUS])
-    border, depth, merge = BORDER * reach, DEPTH * reach, MERGE * reach
-    clouds = shapes.number[si, KIND] == CLOUD or shapes.number[sj, KIND] == CLOUD
-    spacing = max(shapes.size[si, SPACING] * placed.frame[i, SCALE], shapes.size[sj, SPACING] * placed.frame[j, SCALE])
-    if shapes.number[si, KIND] == CLOUD and shapes.number[sj, KIND] == CLOUD:
-        merge = 0.25 * min(
-            shapes.size[si, SPACING] * placed.frame[i, SCALE], shapes.size[sj, SPACING] * placed.frame[j, SCALE]
-        )
-    elif clouds:
-        merge = 0.25 * spacing
-    tight = tolerance + 2.0 * border
-    wide = tight + depth + (spacing if clouds else 0.0)
-    near_i, near_j = nears
-    low, high = box_seen(shapes, sj, to_i)
-    f = 1.0 / placed.frame[i, SCALE]
-    _gather(shapes, near_i, si, low, high, tight * f, wide * f)
-    low, high = box_seen(shapes, si, to_j)
-    g = 1.0 / placed.frame[j, SCALE]
-    _gather(shapes, near_j, sj, low, high, tight * g, wide * g)
-    if shapes.number[sj, KIND] == POLYHEDRON:
-        limits = (tolerance * g, depth * g, border * g)
-        features_on_faces(shapes, placed, near_i, near_j, to_j, found, pair, (i, j, 1.0), limits, merge)
-    else:
-        limits = (tolerance * g, depth * g, spacing * g)
-        features_on_cloud(shapes, placed, near_i, near_j, to_j, found, pair, (i, j, 1.0), limits, merge)
-    if shapes.number[si, KIND] == POLYHEDRON:
-        limits = (tolerance * f, depth * f, border * f)
-        features_on_faces(shapes, placed, near_j, near_i, to_i, found, pair, (j, i, -1.0), limits, merge)
-    else:
-        limits = (tolerance * f, depth * f, spacing * f)
-        features_on_cloud(shapes, placed, near_j, near_i, to_i, found, pair, (j, i, -1.0), limits, merge)
-    if not clouds:
-        limits = (tolerance * g, depth * g, border * g)
-        edges_on_edges(shapes, placed, near_i, near_j, to_j, found, pair, rows, limits, merge)
+    below = 0.0 if placed.frame[j, RADIUS] < np.inf else DEPTH * reach
+    if boxes_apart(shapes, si, sj, to_j, (tolerance + spacing + below) / fj):
+        return
+    border, merge = BORDER * reach, MERGE * reach
+    if spacing > 0.0:
+        merge = 0.25 * (min(spacings[0], spacings[1]) if min(spacings[0], spacings[1]) > 0.0 else spacing)
+    depth = _gather_both(shapes, placed, nears, rows, to_i, to_j, (tolerance + 2.0 * border, DEPTH * reach, spacing))
+    if depth < 0.0:
+        return
+    margins = (tolerance, depth, border, spacing)
+    _features(shapes, placed, nears[0], nears[1], to_j, found, pair, (i, j, 1.0), margins, merge)
+    _features(shapes, placed, nears[1], nears[0], to_i, found, pair, (j, i, -1.0), margins, merge)
+    if spacing == 0.0:
+        limits = (tolerance / fj, depth / fj, border / fj)
+        edges_on_edges(shapes, placed, nears[0], nears[1], to_j, found, pair, rows, limits, merge)
         if shapes.number[si, CONVEX] and shapes.number[sj, CONVEX]:
             keep_least(shapes, placed, found, rows, reach)
 

@@ -72,8 +72,10 @@ class ContactSearch:
                 raise RunError(f"body {bad} is at no finite place")
             if 2.0 * moved + tolerance <= wide and np.array_equal(alive, self.alive):
                 return start, neighbour
-        elif not np.isfinite(x[self.alive]).all():
-            raise RunError("a body is at no finite place")
+        else:
+            _, bad = farthest_move(x, x, self.alive)
+            if bad >= 0:
+                raise RunError(f"body {bad} is at no finite place")
         wide = self._skin + tolerance
         start, neighbour = neighbour_list(x, self._reach, self.alive, wide)
         self._listed = x.copy(), self.alive.copy(), wide, start, neighbour

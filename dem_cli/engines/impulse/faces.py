@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from dem_cli.engines.impulse.arrays import (
     CONVEX,
     CORNERS,
@@ -16,6 +18,7 @@ from dem_cli.engines.impulse.arrays import (
     PLACE,
     POINT0,
     POINTS,
+    RADIUS,
     SCALE,
     SIDE,
     STRETCH,
@@ -165,7 +168,7 @@ def features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, own
     """
     a, b, sign = owner
     sa, sb = placed.shape[a], placed.shape[b]
-    wide = limits[0] + limits[2]
+    wide = limits[0] + limits[2] + (0.0 if placed.frame[b, RADIUS] < np.inf else limits[1])
     low, high = row(shapes.size, sb, LOW), row(shapes.size, sb, HIGH)
     low, high = (low[0] - wide, low[1] - wide, low[2] - wide), (high[0] + wide, high[1] + wide, high[2] + wide)
     other = 0 if sign > 0 else 1

@@ -61,7 +61,8 @@ def _part(shape: Shape) -> _Part:
     count = 0 if kind == SPHERES else len(shape.points)
     trusted = shape.trusted[:count] if kind == CLOUD else np.ones(count)
     point = np.column_stack([shape.points[:count].reshape(-1, 3), shape.normals[:count].reshape(-1, 3), trusted])
-    return _Part(kind, shape.reach, shape.spacing, spheres, mesh_of(*surface), point.astype(float))
+    spacing = shape.spacing if kind == CLOUD else 0.0
+    return _Part(kind, shape.reach, spacing, spheres, mesh_of(*surface), point.astype(float))
 
 
 def _box(part: _Part) -> tuple[Floats, Floats]:
