@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from dem_cli.engines.impulse.arrays import COUNT, FRAME, RADIUS, SCALE, SPHERE0, TURN, Found, Placed
 from dem_cli.engines.impulse.contacts import find, place_spheres
-from dem_cli.engines.impulse.found import Found, empty_found
-from dem_cli.engines.impulse.geometry import flatten
-from dem_cli.engines.impulse.near import empty_near
+from dem_cli.engines.impulse.found import empty_found
+from dem_cli.engines.impulse.geometry import empty_near, flatten, reach_of
 from dem_cli.engines.impulse.search import farthest_move, neighbour_list
-from dem_cli.engines.impulse.vectors import Placed, set_turns
+from dem_cli.engines.impulse.vectors import set_turns
 from dem_cli.errors import RunError
 from dem_cli.rigid import Scene
 from dem_cli.state import Bools, Floats, Ints
@@ -45,20 +45,20 @@ class ContactSearch:
         n, extra = len(bodies), int(terrain)
         self.shapes = flatten(scene)
         shape = np.concatenate([bodies.shape, np.full(extra, len(scene.shapes))]).astype(np.int64)
-        scale = np.concatenate([bodies.scale, np.ones(extra)])
-        turn = np.tile(np.eye(3).reshape(9), (n + extra, 1))
-        self.placed = Placed(np.zeros((n + extra, 3)), turn, scale, self.shapes.reach[shape] * scale, shape)
-        spheres = np.diff(self.shapes.sphere_start)[shape[:n]]
+        frame = np.zeros((n + extra, FRAME))
+        frame[:, TURN : TURN + 9] = np.eye(3).reshape(9)
+        frame[:, SCALE] = 1.0
+        frame[:n, SCALE] = bodies.scale
+        frame[:, RADIUS] = reach_of(self.shapes, shape) * frame[:, SCALE]
+        self.placed = Placed(frame, shape)
+        spheres = np.diff(self.shapes.number[:, SPHERE0])[shape[:n]]
         self._ball_start = np.concatenate([[0], np.cumsum(spheres)]).astype(np.int64)
         self._ball = np.zeros((int(self._ball_start[-1]), 4))
-        sizes = len(self.shapes.triangle), len(self.shapes.edge), len(self.shapes.vertex), len(self.shapes.point)
-        self._nears = empty_near(*sizes), empty_near(*sizes)
-        self._walls = np.ascontiguousarray(
-            np.stack([scene.planes.point, scene.planes.normal], axis=1).reshape(-1, 2, 3)
-        )
+        self._nears = empty_near(self.shapes), empty_near(self.shapes)
+        self._walls = np.hstack([scene.planes.point.reshape(-1, 3), scene.planes.normal.reshape(-1, 3)])
         self._found: Found = empty_found(8 * n + 64)
         self.alive: Bools = ~bodies.escaped
-        self._reach = np.ascontiguousarray(self.placed.reach[:n])
+        self._reach = frame[:n, RADIUS].copy()
         self._skin = skin * float(self._reach.mean()) if n else 0.0
         self._listed: tuple[Floats, Bools, float, Any, Any] | None = None
         self.rebuilds = 0
@@ -72,8 +72,10 @@ class ContactSearch:
                 raise RunError(f"body {bad} is at no finite place")
             if 2.0 * moved + tolerance <= wide and np.array_equal(alive, self.alive):
                 return start, neighbour
-        elif not np.isfinite(x[self.alive]).all():
-            raise RunError("a body is at no finite place")
+        else:
+            _, bad = farthest_move(x, x, self.alive)
+            if bad >= 0:
+                raise RunError(f"body {bad} is at no finite place")
         wide = self._skin + tolerance
         start, neighbour = neighbour_list(x, self._reach, self.alive, wide)
         self._listed = x.copy(), self.alive.copy(), wide, start, neighbour
@@ -87,10 +89,11 @@ class ContactSearch:
         set_turns(self.placed, x, q, n)
         place_spheres(self.shapes, self.placed, self._ball, self._ball_start, n)
         while True:
-            count = find(
+            find(
                 self.shapes, self.placed, self._ball, self._ball_start, self._nears, self._walls, self.alive,
                 start, neighbour, tolerance, self._found,
             )  # fmt: skip
+            count = int(self._found.state[COUNT])
             if count <= len(self._found.i):
-                return Touching(*(array[:count] for array in self._found))
+                return Touching(*(array[:count] for array in self._found[:-1]))
             self._found = empty_found(count + count // 4)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from dem_cli.engines.impulse.arrays import COUNT, FIRST, Found
+from dem_cli.engines.impulse.search import order_of
 from dem_cli.engines.impulse.vectors import dot, row, sub
 from dem_cli.jit import kernel
 
@@ -15,22 +15,11 @@ SHIFT = 28  # bits of each of the two features in a key
 SAME = 0.999  # cosine of the angle between normals that count as one
 
 
-class Found(NamedTuple):
-    """Contacts (capacity,): see `contacts.find`."""
-
-    i: np.ndarray
-    j: np.ndarray
-    key: np.ndarray
-    point: np.ndarray
-    normal: np.ndarray
-    gap: np.ndarray
-
-
 def empty_found(capacity: int) -> Found:
-    whole = np.zeros(capacity, np.int64)
     return Found(
-        whole, whole.copy(), whole.copy(), np.zeros((capacity, 3)), np.zeros((capacity, 3)), np.zeros(capacity)
-    )
+        np.zeros(capacity, np.int64), np.zeros(capacity, np.int64), np.zeros(capacity, np.int64),
+        np.zeros((capacity, 3)), np.zeros((capacity, 3)), np.zeros(capacity), np.zeros(2, np.int64),
+    )  # fmt: skip
 
 
 @kernel(inline=True)
@@ -39,49 +28,47 @@ def key_of(kind, first, second):
 
 
 @kernel()
-def put(found, count, pair, key, point, normal, gap):
-    """Add a contact of pair (i, j); returns how many there are. Beyond the capacity they are counted only."""
-    if count < found.i.size:
-        found.i[count], found.j[count], found.key[count], found.gap[count] = pair[0], pair[1], key, gap
-        found.point[count, 0], found.point[count, 1], found.point[count, 2] = point
-        found.normal[count, 0], found.normal[count, 1], found.normal[count, 2] = normal
-    return count + 1
+def put(found, pair, key, point, normal, gap):
+    """Add a contact of pair (i, j). Beyond the capacity they are counted only."""
+    k = found.state[COUNT]
+    found.state[COUNT] += 1
+    if k < found.i.size:
+        found.i[k], found.j[k], found.key[k], found.gap[k] = pair[0], pair[1], key, gap
+        found.point[k, 0], found.point[k, 1], found.point[k, 2] = point
+        found.normal[k, 0], found.normal[k, 1], found.normal[k, 2] = normal
 
 
 @kernel()
-def put_new(found, first, count, pair, key, point, normal, gap, near, same):
-    """`put`, unless a contact from `first` on lies closer than `near` [m], its normal within the angle of cosine `same`."""
-    for k in range(first, min(count, found.i.size)):
+def put_new(found, pair, key, point, normal, gap, near, same):
+    """`put`, unless the pair has one of this key, or one closer than `near` [m] with its normal within the angle of cosine `same`."""
+    for k in range(found.state[FIRST], min(found.state[COUNT], found.i.size)):
         if found.key[k] == key:
-            return count
-        d = sub(row(found.point, k), point)
-        if dot(d, d) < near * near and dot(row(found.normal, k), normal) > same:
-            return count
-    return put(found, count, pair, key, point, normal, gap)
+            return
+        d = sub(row(found.point, k, 0), point)
+        if dot(d, d) < near * near and dot(row(found.normal, k, 0), normal) > same:
+            return
+    put(found, pair, key, point, normal, gap)
 
 
 @kernel()
-def _swap(found, a, b):
-    found.key[a], found.key[b] = found.key[b], found.key[a]
-    found.gap[a], found.gap[b] = found.gap[b], found.gap[a]
+def move(found, a, b):
+    """Write contact b over contact a of the same pair."""
+    found.key[a], found.gap[a] = found.key[b], found.gap[b]
     for c in range(3):
-        found.point[a, c], found.point[b, c] = found.point[b, c], found.point[a, c]
-        found.normal[a, c], found.normal[b, c] = found.normal[b, c], found.normal[a, c]
+        found.point[a, c], found.normal[a, c] = found.point[b, c], found.normal[b, c]
 
 
 @kernel()
-def sort_pair(found, first, count):
-    """Sort the contacts of one pair by key, in place; they mostly are."""
-    count = min(count, found.i.size)
-    if count - first > 64:
-        order = np.argsort(found.key[first:count], kind="mergesort")
-        found.key[first:count] = found.key[first:count][order]
-        found.gap[first:count] = found.gap[first:count][order]
-        found.point[first:count] = found.point[first:count][order]
-        found.normal[first:count] = found.normal[first:count][order]
+def sort_pair(found):
+    """Sort the contacts of the present pair by key, in place; they mostly are."""
+    first, end = found.state[FIRST], min(found.state[COUNT], found.i.size)
+    sorted_already = True
+    for k in range(first + 1, end):
+        sorted_already = sorted_already and found.key[k - 1] < found.key[k]
+    if sorted_already:
         return
-    for k in range(first + 1, count):
-        m = k
-        while m > first and found.key[m - 1] > found.key[m]:
-            _swap(found, m - 1, m)
-            m -= 1
+    order = order_of(found.key[first:end])
+    found.key[first:end] = found.key[first:end][order]
+    found.gap[first:end] = found.gap[first:end][order]
+    found.point[first:end] = found.point[first:end][order]
+    found.normal[first:end] = found.normal[first:end][order]

@@ -2,47 +2,40 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
+from dem_cli.engines.impulse.arrays import (
+    BEND,
+    BOX_HIGH,
+    BOX_LOW,
+    CORNER0,
+    CORNERS,
+    END,
+    HIGH,
+    IS_CORNER,
+    LOW,
+    OTHER_END,
+    PLACE,
+    POINT_CELL,
+    POINT_GRID,
+    POINTS,
+    RIDGE0,
+    RIDGES,
+    STAMP,
+    TRIANGLE0,
+    TRIANGLE_CELL,
+    TRIANGLE_EDGE,
+    TRIANGLE_GRID,
+    TRIANGLE_VERTEX,
+    TRIANGLES,
+)
 from dem_cli.engines.impulse.vectors import add, placed_at, row, sub, times
 from dem_cli.jit import kernel
 
-TRIANGLES, RIDGES, CORNERS, POINTS, STAMP = range(5)
-FEW = 40  # triangles or points that are looked at one by one rather than by the grid
-
-
-class Near(NamedTuple):
-    """Features of one body that were gathered, as indices into `Shapes`: the first count[k] of each array; all arrays are as long as may be.
-
-    seen_*: the last call that looked at a feature, so that each is gathered once. way, depth: scratch of who asks.
-    """
-
-    triangle: np.ndarray
-    ridge: np.ndarray
-    corner: np.ndarray
-    point: np.ndarray
-    count: np.ndarray
-    seen_triangle: np.ndarray
-    seen_edge: np.ndarray
-    seen_vertex: np.ndarray
-    held: np.ndarray
-    height: np.ndarray
-
-
-def empty_near(triangles: int, edges: int, vertices: int, points: int) -> Near:
-    """A Near for shapes with so many features in all."""
-    return Near(
-        np.zeros(triangles, np.int64), np.zeros(edges, np.int64), np.zeros(vertices, np.int64), np.zeros(points, np.int64),
-        np.zeros(5, np.int64), np.zeros(triangles, np.int64), np.zeros(edges, np.int64), np.zeros(vertices, np.int64),
-        np.zeros(triangles, np.int64), np.zeros(triangles),
-    )  # fmt: skip
+FEW = 40  # triangles that are looked at one by one rather than by the grid
 
 
 @kernel(inline=True)
 def _half(shapes, s):
-    low, high = row(shapes.low, s), row(shapes.high, s)
+    low, high = row(shapes.size, s, LOW), row(shapes.size, s, HIGH)
     return times(add(low, high), 0.5), times(sub(high, low), 0.5)
 
 
@@ -111,22 +104,34 @@ def holds(low, high, p):
 
 
 @kernel(inline=True)
-def _cells(grids, s, low, high):
-    """Ranges of cells that a box meets, cut to the grid: (x0, x1, y0, y1, z0, z1); empty where x1 < x0 and so on."""
-    origin, c, size = row(grids.origin, s), grids.cell[s], grids.size
-    x0, x1 = max((low[0] - origin[0]) / c, 0.0), min((high[0] - origin[0]) / c, size[s, 0] - 1.0)
-    y0, y1 = max((low[1] - origin[1]) / c, 0.0), min((high[1] - origin[1]) / c, size[s, 1] - 1.0)
-    z0, z1 = max((low[2] - origin[2]) / c, 0.0), min((high[2] - origin[2]) / c, size[s, 2] - 1.0)
-    return (
-        int(np.floor(min(x0, 1e9))), int(np.floor(max(x1, -1.0))), int(np.floor(min(y0, 1e9))),
-        int(np.floor(max(y1, -1.0))), int(np.floor(min(z0, 1e9))), int(np.floor(max(z1, -1.0))),
-    )  # fmt: skip
+def _cut(low, high, origin, cell, many):
+    """First and last of the cells along an axis that meet an interval; there are none where the last is less than the first."""
+    return int(min(max((low - origin) / cell, 0.0), float(many))), int(
+        max(min((high - origin) / cell, many - 1.0), -1.0)
+    )
+
+
+@kernel()
+def _cells(shapes, s, low, high, number, size):
+    """Cells of a grid that a box meets: (x0, x1, y0, y1, z0, z1). number, size: where the grid's columns start."""
+    origin, cell, many = row(shapes.size, s, size), shapes.size[s, size + 3], row(shapes.number, s, number + 1)
+    x0, x1 = _cut(low[0], high[0], origin[0], cell, many[0])
+    y0, y1 = _cut(low[1], high[1], origin[1], cell, many[1])
+    z0, z1 = _cut(low[2], high[2], origin[2], cell, many[2])
+    return x0, x1, y0, y1, z0, z1
+
+
+@kernel(inline=True)
+def _span(shapes, s, number, x, y, z0, z1):
+    """Members of the cells z0 to z1 of column (x, y): the first, and one past the last."""
+    at = shapes.number[s, number] + (x * shapes.number[s, number + 2] + y) * shapes.number[s, number + 3]
+    return shapes.cell[at + z0], shapes.cell[at + max(z1 + 1, z0)]
 
 
 @kernel()
 def _take_triangle(shapes, near, t, low, high):
-    if _meets(low, high, row(shapes.triangle_low, t), row(shapes.triangle_high, t)):
-        near.triangle[near.count[TRIANGLES]] = t
+    if _meets(low, high, row(shapes.triangle, t, BOX_LOW), row(shapes.triangle, t, BOX_HIGH)):
+        near.item[TRIANGLES, near.count[TRIANGLES]] = t
         near.count[TRIANGLES] += 1
 
 
@@ -134,35 +139,35 @@ def _take_triangle(shapes, near, t, low, high):
 def gather_triangles(shapes, near, s, low, high):
     """Triangles of shape s whose boxes meet the box (low, high), into `near`."""
     near.count[TRIANGLES] = 0
-    start, end = shapes.triangle_start[s], shapes.triangle_start[s + 1]
+    start, end = shapes.number[s, TRIANGLE0], shapes.number[s + 1, TRIANGLE0]
     if end - start <= FEW:
         for t in range(start, end):
             _take_triangle(shapes, near, t, low, high)
         return
     near.count[STAMP] += 1
     stamp = near.count[STAMP]
-    grids = shapes.triangles
-    size, first = grids.size, grids.offset[s]
-    x0, x1, y0, y1, z0, z1 = _cells(grids, s, low, high)
+    x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, TRIANGLE_GRID, TRIANGLE_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
-            at = first + (x * size[s, 1] + y) * size[s, 2]
-            if z1 >= z0:
-                for m in range(grids.start[at + z0], grids.start[at + z1 + 1]):
-                    t = grids.member[m]
-                    if near.seen_triangle[t] != stamp:
-                        near.seen_triangle[t] = stamp
-                        _take_triangle(shapes, near, t, low, high)
+            first, last = _span(shapes, s, TRIANGLE_GRID, x, y, z0, z1)
+            for m in range(first, last):
+                t = shapes.member[m]
+                if near.seen[0, t] != stamp:
+                    near.seen[0, t] = stamp
+                    _take_triangle(shapes, near, t, low, high)
 
 
 @kernel()
 def _take_ridge(shapes, near, e, low, high):
-    a, b = row(shapes.vertex, shapes.edge[e, 0]), row(shapes.vertex, shapes.edge[e, 1])
+    a, b = (
+        row(shapes.vertex, shapes.edge_part[e, END], PLACE),
+        row(shapes.vertex, shapes.edge_part[e, OTHER_END], PLACE),
+    )
     if (
         min(a[0], b[0]) <= high[0] and max(a[0], b[0]) >= low[0] and min(a[1], b[1]) <= high[1]
         and max(a[1], b[1]) >= low[1] and min(a[2], b[2]) <= high[2] and max(a[2], b[2]) >= low[2]
     ):  # fmt: skip
-        near.ridge[near.count[RIDGES]] = e
+        near.item[RIDGES, near.count[RIDGES]] = e
         near.count[RIDGES] += 1
 
 
@@ -170,28 +175,28 @@ def _take_ridge(shapes, near, e, low, high):
 def gather_edges(shapes, near, s, low, high):
     """Corners and convex edges of shape s that meet the box (low, high), into `near`, whose triangles are gathered in a box as large."""
     near.count[RIDGES] = near.count[CORNERS] = 0
-    if shapes.triangle_start[s + 1] - shapes.triangle_start[s] <= FEW:
-        for k in range(shapes.ridge_start[s], shapes.ridge_start[s + 1]):
+    if shapes.number[s + 1, TRIANGLE0] - shapes.number[s, TRIANGLE0] <= FEW:
+        for k in range(shapes.number[s, RIDGE0], shapes.number[s + 1, RIDGE0]):
             _take_ridge(shapes, near, shapes.ridge[k], low, high)
-        for k in range(shapes.corners_start[s], shapes.corners_start[s + 1]):
-            if holds(low, high, row(shapes.vertex, shapes.corners[k])):
-                near.corner[near.count[CORNERS]] = shapes.corners[k]
+        for k in range(shapes.number[s, CORNER0], shapes.number[s + 1, CORNER0]):
+            if holds(low, high, row(shapes.vertex, shapes.corner[k], PLACE)):
+                near.item[CORNERS, near.count[CORNERS]] = shapes.corner[k]
                 near.count[CORNERS] += 1
         return
     near.count[STAMP] += 1
     stamp = near.count[STAMP]
     for m in range(near.count[TRIANGLES]):
-        t = near.triangle[m]
+        t = near.item[TRIANGLES, m]
         for k in range(3):
-            e, v = shapes.triangle_edge[t, k], shapes.triangle[t, k]
-            if near.seen_edge[e] != stamp:
-                near.seen_edge[e] = stamp
-                if shapes.bend[e] > 0:
+            e, v = shapes.triangle_part[t, TRIANGLE_EDGE + k], shapes.triangle_part[t, TRIANGLE_VERTEX + k]
+            if near.seen[1, e] != stamp:
+                near.seen[1, e] = stamp
+                if shapes.edge_part[e, BEND] > 0:
                     _take_ridge(shapes, near, e, low, high)
-            if near.seen_vertex[v] != stamp:
-                near.seen_vertex[v] = stamp
-                if shapes.corner[v] and holds(low, high, row(shapes.vertex, v)):
-                    near.corner[near.count[CORNERS]] = v
+            if near.seen[2, v] != stamp:
+                near.seen[2, v] = stamp
+                if shapes.vertex_part[v, IS_CORNER] and holds(low, high, row(shapes.vertex, v, PLACE)):
+                    near.item[CORNERS, near.count[CORNERS]] = v
                     near.count[CORNERS] += 1
 
 
@@ -199,18 +204,12 @@ def gather_edges(shapes, near, s, low, high):
 def gather_points(shapes, near, s, low, high):
     """Face points or particles of shape s in the box (low, high), into `near`."""
     near.count[POINTS] = 0
-    start, end = shapes.point_start[s], shapes.point_start[s + 1]
-    grids = shapes.points
-    size, first = grids.size, grids.offset[s]
-    if end - start <= FEW:
-        x0, x1, y0, y1, z0, z1 = 0, size[s, 0] - 1, 0, size[s, 1] - 1, 0, size[s, 2] - 1
-    else:
-        x0, x1, y0, y1, z0, z1 = _cells(grids, s, low, high)
+    x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, POINT_GRID, POINT_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
-            at = first + (x * size[s, 1] + y) * size[s, 2]
-            if z1 >= z0:
-                for m in range(grids.start[at + z0], grids.start[at + z1 + 1]):
-                    if holds(low, high, row(shapes.point, grids.member[m])):
-                        near.point[near.count[POINTS]] = grids.member[m]
-                        near.count[POINTS] += 1
+            first, last = _span(shapes, s, POINT_GRID, x, y, z0, z1)
+            for m in range(first, last):
+                k = shapes.member[m]
+                if holds(low, high, row(shapes.point, k, PLACE)):
+                    near.item[POINTS, near.count[POINTS]] = k
+                    near.count[POINTS] += 1

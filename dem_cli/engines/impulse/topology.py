@@ -49,7 +49,7 @@ class Mesh(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Boxes sorted into a grid: origin (3,), cell [m], size (3,); members of cell (x size_1 + y) size_2 + z are member[start[c]:start[c + 1]]."""
+    """Boxes in a grid: origin (3,), cell [m], size (3,); members of cell (x size_1 + y) size_2 + z are member[start[c]:start[c + 1]]."""
 
     origin: Floats
     cell: float

@@ -2,30 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple
-
-import numpy as np
-
+from dem_cli.engines.impulse.arrays import CENTER, SCALE, TURN
 from dem_cli.jit import kernel
 
 
-class Placed(NamedTuple):
-    """Where bodies are: x (n, 3) [m], turn (n, 9): matrix from the shape's frame to the container's, scale, reach [m] (n,), shape (n,).
-
-    The terrain, where there is one, is the last.
-    """
-
-    x: np.ndarray
-    turn: np.ndarray
-    scale: np.ndarray
-    reach: np.ndarray
-    shape: np.ndarray
-
-
 @kernel(inline=True)
-def row(a, k):
-    return a[k, 0], a[k, 1], a[k, 2]
+def row(a, k, c):
+    """Row k of array a from column c on."""
+    return a[k, c], a[k, c + 1], a[k, c + 2]
 
 
 @kernel(inline=True)
@@ -81,14 +65,17 @@ def turned_back(m, v):
 
 @kernel(inline=True)
 def turn_of(placed, i):
-    t = placed.turn
-    return t[i, 0], t[i, 1], t[i, 2], t[i, 3], t[i, 4], t[i, 5], t[i, 6], t[i, 7], t[i, 8]
+    f = placed.frame
+    return (
+        f[i, TURN], f[i, TURN + 1], f[i, TURN + 2], f[i, TURN + 3], f[i, TURN + 4], f[i, TURN + 5],
+        f[i, TURN + 6], f[i, TURN + 7], f[i, TURN + 8],
+    )  # fmt: skip
 
 
 @kernel(inline=True)
 def to_world(placed, i, p):
     """Place of a point of body i's frame of scale 1."""
-    return along(row(placed.x, i), turned(turn_of(placed, i), p), placed.scale[i])
+    return along(row(placed.frame, i, CENTER), turned(turn_of(placed, i), p), placed.frame[i, SCALE])
 
 
 @kernel()
@@ -99,8 +86,10 @@ def relative(placed, a, b):
     y = turned_back(tb, (ta[1], ta[4], ta[7]))
     z = turned_back(tb, (ta[2], ta[5], ta[8]))
     m = (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
-    t = times(turned_back(tb, sub(row(placed.x, a), row(placed.x, b))), 1.0 / placed.scale[b])
-    return m, t, placed.scale[a] / placed.scale[b]
+    t = times(
+        turned_back(tb, sub(row(placed.frame, a, CENTER), row(placed.frame, b, CENTER))), 1.0 / placed.frame[b, SCALE]
+    )
+    return m, t, placed.frame[a, SCALE] / placed.frame[b, SCALE]
 
 
 @kernel(inline=True)
@@ -112,13 +101,16 @@ def placed_at(relation, p):
 @kernel()
 def set_turns(placed, x, q, n):
     """Write x (n, 3) and the matrices of the quaternions q (n, 4) of the first n bodies into `placed`."""
+    f = placed.frame
     for i in range(n):
         w, a, b, c = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
-        t = placed.turn
-        t[i, 0], t[i, 1], t[i, 2] = 1.0 - 2.0 * (b * b + c * c), 2.0 * (a * b - w * c), 2.0 * (a * c + w * b)
-        t[i, 3], t[i, 4], t[i, 5] = 2.0 * (a * b + w * c), 1.0 - 2.0 * (a * a + c * c), 2.0 * (b * c - w * a)
-        t[i, 6], t[i, 7], t[i, 8] = 2.0 * (a * c - w * b), 2.0 * (b * c + w * a), 1.0 - 2.0 * (a * a + b * b)
-        placed.x[i, 0], placed.x[i, 1], placed.x[i, 2] = x[i, 0], x[i, 1], x[i, 2]
+        f[i, CENTER], f[i, CENTER + 1], f[i, CENTER + 2] = x[i, 0], x[i, 1], x[i, 2]
+        f[i, TURN], f[i, TURN + 4], f[i, TURN + 8] = (
+            1.0 - 2.0 * (b * b + c * c), 1.0 - 2.0 * (a * a + c * c), 1.0 - 2.0 * (a * a + b * b),
+        )  # fmt: skip
+        f[i, TURN + 1], f[i, TURN + 3] = 2.0 * (a * b - w * c), 2.0 * (a * b + w * c)
+        f[i, TURN + 2], f[i, TURN + 6] = 2.0 * (a * c + w * b), 2.0 * (a * c - w * b)
+        f[i, TURN + 5], f[i, TURN + 7] = 2.0 * (b * c - w * a), 2.0 * (b * c + w * a)
 
 
 @kernel(inline=True)
