@@ -49,9 +49,7 @@ class Scale(Table):
     """Factors on all lengths of the bodies: a number if all are equal, or a table with exactly one of the keys below."""
 
     fixed: Factor | None = key(None, doc="all bodies have this factor; the same as scale = 1.5", example=1.5)
-    uniform: tuple[Factor, Factor] | None = key(
-        None, doc="evenly distributed between two factors", example=[0.5, 1.5]
-    )
+    uniform: tuple[Factor, Factor] | None = key(None, doc="evenly distributed between two factors", example=[0.5, 1.5])
     normal: ScaleNormal | None = key(
         None,
         doc="normal distribution, cut off at both ends",

@@ -138,9 +138,9 @@ class Table(BaseModel):
             found = [said for one in error.errors(include_url=False) if (said := _in_our_words(cls, one))]
             good = _good_values(cls, raw)
         for loc, rule, remedy in (*_alternatives(cls, raw), *cls.rules(Given(raw, good))):
-            if rule == "is missing" and _at(raw, loc) is not NOTHING:
+            if rule == "is missing" and value_at(raw, loc) is not NOTHING:
                 continue  # it is there but wrong, which is said already
-            found.append(InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=_at(raw, loc)))
+            found.append(InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=value_at(raw, loc)))
         found = _without_echoes(found)
         if not isinstance(written, dict):  # a short form: what is wrong with it is said once, where it stands
             found = list({_said(one)[:2]: InitErrorDetails(type=one["type"], input=written) for one in found}.values())
@@ -179,7 +179,8 @@ class _Nothing:
 NOTHING = _Nothing()
 
 
-def _at(raw: Any, loc: tuple[str | int, ...]) -> Any:
+def value_at(raw: Any, loc: tuple[str | int, ...]) -> Any:
+    """What TOML data hold at a place; NOTHING if there is no such."""
     for part in loc:
         try:
             raw = raw[part]
@@ -231,7 +232,7 @@ def _valid(adapter: TypeAdapter[Any], value: Any) -> Any:
         wrong = [one["loc"] for one in error.errors(include_url=False, include_input=False)]
     pruned = copy.deepcopy(value)
     for loc in wrong:
-        table = _at(pruned, loc[:-1])
+        table = value_at(pruned, loc[:-1])
         if loc and isinstance(table, dict):
             table.pop(str(loc[-1]), None)
     return adapter.validate_python(pruned)
