@@ -28,8 +28,11 @@ COARSE = 0.25  # of the smallest body's size: a motion in a step that is warned 
 
 @dataclass(frozen=True)
 class KindPlan:
-    """Bodies of one kind. size [m]: radius of their bounding spheres; a spread is (smallest, mean, largest). inertia [kg m^2]: principal
-    moments of scale 1. spheres, corners, triangles, points, trusted: what contacts are found with, a body."""
+    """Bodies of one kind.
+
+    size [m]: radius of their bounding spheres; a spread is (smallest, mean, largest). inertia [kg m^2]: principal moments of scale 1. spheres,
+    corners, triangles, points, trusted: what contacts are found with, a body.
+    """
 
     name: str
     shape: str
@@ -48,8 +51,11 @@ class KindPlan:
 
 @dataclass(frozen=True)
 class DerivedImpulse:
-    """Derived numbers in SI units; see KindPlan. time_step_rule: the step that auto takes, time_step_bound: what it follows from; largest_speed: that it reckons with;
-    fall_height: of the highest body, over what is below it. low, high: where bodies count as escaped. notes: on the quality of clouds."""
+    """Derived numbers in SI units; see KindPlan.
+
+    time_step_rule: the step that auto takes, time_step_bound: what it follows from. largest_speed: that it reckons with, fall_height: of the
+    highest body, over what is below it. low, high: where bodies count as escaped. notes: on the quality of clouds.
+    """
 
     title: str
     hash: str

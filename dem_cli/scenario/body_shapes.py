@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
-from dem_cli.scenario.quantities import Angle, JsonSchema, Number, Whole
+from dem_cli.scenario.quantities import Angle, JsonSchema, Number, Whole, mistake
 from dem_cli.scenario.radii import Normal
 from dem_cli.scenario.table import Given, Mistake, Table, key
 from dem_cli.scenario.vectors import Coordinate, Direction, Quaternion
@@ -120,6 +120,8 @@ class BodyOrientation(Table):
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
+        if isinstance(raw, str) and raw != "random":
+            raise mistake('must be "random", or a table', 'Write for example { axis = [0, 0, 1], angle = "30 deg" }')
         return {"random": True} if raw == "random" else raw
 
     @property

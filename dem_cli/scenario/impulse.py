@@ -191,7 +191,13 @@ def _named_once(table: str, names: Sequence[str], others: Sequence[str] = ()) ->
 
 
 def _room_to_pack(kinds: Sequence[BodyKind], packing: ImpulsePacking, container: ImpulseContainer) -> Iterator[Mistake]:
-    """There is somewhere to put bodies without position."""
+    """There is somewhere to put bodies without position, and it lies in the container."""
+    if packing.region and container.width is not None and container.breadth is not None:
+        most = (container.width, container.breadth, container.height or float("inf"))
+        for axis, end, low, high in zip("xyz", most, packing.region.low, packing.region.high, strict=True):
+            if low < 0.0 or high > end * (1.0 + 1e-12):
+                rule = f"reaches beyond the container, which goes from 0 m to {end:g} m along {axis}"
+                yield Mistake(("packing", "region"), rule, "Make it smaller, or leave it out")
     if packing.region or container.width is not None or all(kind.position is not None for kind in kinds):
         return
     number = next(k for k, kind in enumerate(kinds) if kind.position is None)
@@ -231,5 +237,5 @@ def _check_fits(check: str, bodies: int, planes: int, gravity: float) -> Iterato
     }
     fits, words = wanted[check]
     if not fits:
-        has = f"here are {bodies} bodies and {planes} planes, gravity is {gravity:g} m/s^2"
+        has = f"here: bodies {bodies}, planes {planes}, gravity {gravity:g} m/s^2"
         yield Mistake(("output", "check"), f"is {words}; {has}", "Leave it out, or change the scenario")

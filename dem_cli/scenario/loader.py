@@ -74,7 +74,9 @@ def parse_scenario(
     from_file: list[Found] = []
     if kind is ImpulseScenario:
         assert scenario is None or isinstance(scenario, ImpulseScenario)
-        from_file += _missing_files(raw, folder) or _stored_bodies(folder, scenario)
+        said = [one[0] for one in found]
+        from_file += [one for one in _missing_files(raw, folder) if one[0] not in said]
+        from_file += [] if from_file else _stored_bodies(folder, scenario)
     elif not any(one[0] == ("packing", "file") for one in found):
         assert not isinstance(scenario, ImpulseScenario)
         from_file += _packing_file(raw, folder, scenario)

@@ -248,12 +248,17 @@ def _in_our_words(cls: type[Table], error: Any) -> InitErrorDetails | None:
     rule, remedy = "is not valid", str(error["msg"])
     if kind == "tuple_type" and loc[-1:] == ("stage",):
         rule, remedy = "must be a list of tables", "Head each stage with [[stage]], in double brackets"
+    elif kind == "tuple_type" and loc[-1:] in (("grains",), ("plane",)):
+        rule, remedy = (
+            "must be a table, or a list of tables",
+            f"Head it with [{loc[-1]}], or each one with [[{loc[-1]}]]",
+        )
     elif kind in _PLAIN:
         rule, remedy = _PLAIN[kind]
     elif kind == "extra_forbidden":
         rule, remedy = cls.other_engine(str(loc[-1])) or ("unknown key", did_you_mean(str(loc[-1]), keys_of(cls)))
     elif kind == "missing" and isinstance(loc[-1], int):
-        rule, remedy, value = "is missing", "Give both values", NOTHING
+        rule, remedy, value = "is missing", "Give both values" if loc[-1] < 2 else "Give all values", NOTHING
     elif kind == "missing":
         rule, remedy, value = "is missing", _example_of(cls, str(loc[-1])), NOTHING
     elif kind == "literal_error" and (other := cls.other_engine(f"{loc[-1]}={value}")):
