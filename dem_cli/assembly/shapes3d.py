@@ -8,11 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dem_cli.assembly.clouds import read_cloud
 from dem_cli.assembly.clumps import sphere_surfaces, union_of_spheres
-from dem_cli.assembly.solids import Solid, ball, cuboid, principal, quaternion_of
+from dem_cli.assembly.meshes import check_closed, pieces_of, read_mesh
+from dem_cli.assembly.solids import Solid, ball, cuboid, polyhedron, principal, quaternion_of
 from dem_cli.rigid import Shape
 from dem_cli.scenario import BodyKind
-from dem_cli.state import Floats, Ints
+from dem_cli.state import Bools, Floats, Ints
 
 # Corners of a box of edge 2, and its faces, anticlockwise seen from outside.
 CORNERS = np.array([[x, y, z] for z in (-1.0, 1.0) for y in (-1.0, 1.0) for x in (-1.0, 1.0)])
@@ -21,12 +23,16 @@ NO_POINTS = np.empty((0, 3))
 
 
 class Made(NamedTuple):
-    """A shape of scale 1. turned (4,): quaternion that turns its frame, that of its principal axes, into the one that it was described in.
-    unit: the length that scale 1 stands for, of shapes with a radius; else 1. warnings: what there is to tell of it."""
+    """A shape of scale 1, and how its bodies are made of it.
+
+    turned (4,): quaternion that turns its frame, that of its principal axes, into that of the file or key. unit: the length that scale 1
+    stands for, of shapes with a radius; else 1. told: of the quality of a cloud. warnings: what is seldom meant.
+    """
 
     shape: Shape
     turned: Floats
     unit: float = 1.0
+    told: str = ""
     warnings: tuple[str, ...] = ()
 
 
@@ -36,7 +42,9 @@ def make_shape(kind: BodyKind, path_of: Callable[[str], Path]) -> Made:
         return Made(box(kind), np.array([1.0, 0.0, 0.0, 0.0]))
     if kind.shape in ("sphere", "clump"):
         return _of_spheres(kind)
-    raise NotImplementedError(kind.shape)
+    assert kind.file is not None
+    path = path_of(kind.file)
+    return _of_mesh(kind, path) if kind.shape == "mesh" else _of_cloud(kind, path)
 
 
 def box(kind: BodyKind) -> Shape:
@@ -79,10 +87,32 @@ def _of_spheres(kind: BodyKind) -> Made:
         solid = union_of_spheres(centres, radii)
     _, axes = principal(solid)
     centres = (centres - solid.centre) @ axes
-    shape = finished(
-        kind, "spheres", solid, axes, surface=sphere_surfaces(centres, radii), spheres=(centres, radii)
-    )
+    shape = finished(kind, "spheres", solid, axes, surface=sphere_surfaces(centres, radii), spheres=(centres, radii))
     return Made(shape, quaternion_of(axes), unit)
+
+
+def _of_mesh(kind: BodyKind, path: Path) -> Made:
+    vertices, triangles = read_mesh(path, kind.file_unit or "m")
+    check_closed(path, vertices, triangles)
+    solid = polyhedron(vertices, triangles)
+    _, axes = principal(solid)
+    shape = finished(kind, "polyhedron", solid, axes, surface=((vertices - solid.centre) @ axes, triangles))
+    warnings: tuple[str, ...] = ()
+    if (pieces := pieces_of(triangles, len(vertices))) > 1:
+        warnings = (f"mesh {kind.name}: its surface is {pieces} separate pieces, which move as one body",)
+    return Made(shape, quaternion_of(axes), warnings=warnings)
+
+
+def _of_cloud(kind: BodyKind, path: Path) -> Made:
+    cloud = read_cloud(path, kind.file_unit or "m", kind.spacing, kind.name)
+    _, axes = principal(cloud.solid)
+    centre = cloud.solid.centre
+    vertices, triangles = cloud.surface
+    shape = finished(
+        kind, "cloud", cloud.solid, axes, surface=((vertices - centre) @ axes, triangles),
+        points=((cloud.points - centre) @ axes, cloud.normals @ axes), trusted=cloud.trusted, spacing=cloud.spacing,
+    )  # fmt: skip
+    return Made(shape, quaternion_of(axes), warnings=cloud.warnings, told=cloud.words(kind.name))
 
 
 def finished(
@@ -94,7 +124,7 @@ def finished(
     surface: tuple[Floats, Ints],
     spheres: tuple[Floats, Floats] = (NO_POINTS, np.empty(0)),
     points: tuple[Floats, Floats] = (NO_POINTS, NO_POINTS),
-    trusted: Floats | None = None,
+    trusted: Bools | None = None,
     spacing: float = 0.0,
 ) -> Shape:
     """A shape with its mass; all places are in the frame of `axes` about the solid's centre already."""

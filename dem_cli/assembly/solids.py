@@ -74,7 +74,8 @@ def principal(solid: Solid) -> tuple[Floats, Floats]:
     if np.max(np.abs(off)) <= EVEN * np.max(np.abs(tensor)):
         return np.diag(tensor).copy(), np.eye(3)
     moments, axes = np.linalg.eigh(tensor)
-    order = list(max(permutations(range(3)), key=lambda p: sum(abs(axes[k, p[k]]) for k in range(3))))
+    orders = [list(order) for order in permutations(range(3))]
+    order = max(orders, key=lambda one: float(np.abs(np.diag(axes[:, one])).sum()))
     moments, axes = moments[order], axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0.0, -1.0, 1.0)
     if np.linalg.det(axes) < 0.0:

@@ -45,7 +45,7 @@ def _walls(container: ImpulseContainer, high: Floats) -> list[tuple[str, Floats,
         return []
     a, b = container.width, container.breadth
     h = container.height or max(float(high[2]), 0.5 * max(a, b))
-    corner = {
+    corner: dict[str, list[tuple[float, float, float]]] = {
         "left": [(0, 0, 0), (0, b, 0), (0, b, h), (0, 0, h)],
         "right": [(a, 0, 0), (a, 0, h), (a, b, h), (a, b, 0)],
         "front": [(0, 0, 0), (0, 0, h), (a, 0, h), (a, 0, 0)],
@@ -53,7 +53,7 @@ def _walls(container: ImpulseContainer, high: Floats) -> list[tuple[str, Floats,
         "bottom": [(0, 0, 0), (a, 0, 0), (a, b, 0), (0, b, 0)],
         "top": [(0, 0, h), (0, b, h), (a, b, h), (a, 0, h)],
     }
-    normal = {
+    normal: dict[str, tuple[float, float, float]] = {
         "left": (1, 0, 0), "right": (-1, 0, 0), "front": (0, 1, 0), "back": (0, -1, 0), "bottom": (0, 0, 1), "top": (0, 0, -1),
     }  # fmt: skip
     return [

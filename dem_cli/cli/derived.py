@@ -241,13 +241,13 @@ def _warnings(scenario: Scenario, overlap: float, creep: float | None) -> list[s
         )
     for number, stage in enumerate(scenario.stages, 1):
         if isinstance(stage, Shake):
-            said += [f"stage {number} {words}" for words in _about_shaking(stage, scenario.output.interval)]
+            said += [f"stage {number} {words}" for words in about_shaking(stage, scenario.output.interval)]
     if scenario.integration.integrator == "thesis" and max(scenario.contact.damping()) < 0.05:
         said.append('integrator = "thesis" gains energy, and there is little damping to take it away')
     return said
 
 
-def _about_shaking(stage: Shake, interval: float) -> Iterator[str]:
+def about_shaking(stage: Shake, interval: float) -> Iterator[str]:
     """What is odd about a shaking whose series has rows every `interval` [s]."""
     if (motion := stage.motion) is not None:
         for one in motion.components:

@@ -85,7 +85,9 @@ class AnyScenario(Table):
 class DiscScenario(AnyScenario):
     """A scenario of grains in the plane: cylinders whose contacts have a stiffness."""
 
-    depth: Length = key("1 m", "depth of the grains, which are cylinders, into the plane", example="1 m")
+    depth: Length = key(
+        "1 m", "depth of the grains, which are cylinders, into the plane (not with impulse)", example="1 m"
+    )
     grains: Grains = key(doc="the grains")
     material: Material = key(doc="stiffness of contacts")
     contact: Table = key(doc="the law of contacts")

@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
-from dem_cli.scenario.quantities import Angle, JsonSchema, Number, Whole
+from dem_cli.scenario.quantities import Angle, JsonSchema, Number, Whole, mistake
 from dem_cli.scenario.radii import Normal
 from dem_cli.scenario.table import Given, Mistake, Table, key
 from dem_cli.scenario.vectors import Coordinate, Direction, Quaternion
@@ -49,9 +49,7 @@ class Scale(Table):
     """Factors on all lengths of the bodies: a number if all are equal, or a table with exactly one of the keys below."""
 
     fixed: Factor | None = key(None, doc="all bodies have this factor; the same as scale = 1.5", example=1.5)
-    uniform: tuple[Factor, Factor] | None = key(
-        None, doc="evenly distributed between two factors", example=[0.5, 1.5]
-    )
+    uniform: tuple[Factor, Factor] | None = key(None, doc="evenly distributed between two factors", example=[0.5, 1.5])
     normal: ScaleNormal | None = key(
         None,
         doc="normal distribution, cut off at both ends",
@@ -122,6 +120,8 @@ class BodyOrientation(Table):
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
+        if isinstance(raw, str) and raw != "random":
+            raise mistake('must be "random", or a table', 'Write for example { axis = [0, 0, 1], angle = "30 deg" }')
         return {"random": True} if raw == "random" else raw
 
     @property

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import GetJsonSchemaHandler, PrivateAttr
+from pydantic_core import core_schema
 
 from dem_cli.scenario.base import AnyScenario, tracked_exist
 from dem_cli.scenario.impulse_bodies import BodyKind
@@ -19,20 +22,32 @@ from dem_cli.scenario.impulse_tables import (
     Plane,
     TerrainTable,
 )
+from dem_cli.scenario.quantities import JsonSchema
+from dem_cli.scenario.stored_bodies import StoredBodies, read_stored_bodies
 from dem_cli.scenario.table import Given, Mistake, Table, did_you_mean, key
 
 EXPLICIT, QUASI_STATIC = "explicit", "granular-element"
 WALLS = ("left", "right", "front", "back", "bottom", "top")
 
 
+class _OneOrMany:
+    """Annotation of a list of tables in JSON Schema: a single table may stand in its place."""
+
+    def __get_pydantic_json_schema__(self, core: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
+        listed = handler(core)
+        return {"anyOf": [listed["items"], listed]}
+
+
 class ImpulseScenario(AnyScenario):
     """A scenario of the impulse engine, complete and consistent: every default filled in, every rule checked."""
 
     engine: Literal["impulse"] = key(doc="rigid bodies in three dimensions, moved by impulses", example="impulse")
-    grains: tuple[BodyKind, ...] = key((), doc="the bodies, kind by kind")
+    grains: Annotated[tuple[BodyKind, ...], _OneOrMany()] = key((), doc="the bodies, kind by kind")
     contact: ImpulseContact = key(doc="the law of contacts")
     container: ImpulseContainer = key({}, doc="walls and gravity")
-    planes: tuple[Plane, ...] = key((), alias="plane", doc="planes without end: one [[plane]] table each")
+    planes: Annotated[tuple[Plane, ...], _OneOrMany()] = key(
+        (), alias="plane", doc="planes without end: one [[plane]] table each"
+    )
     terrain: TerrainTable | None = key(None, doc="a fixed surface")
     packing: ImpulsePacking = key({}, doc="where bodies without position are at the start")
     stages: tuple[ImpulseStage, ...] = key(alias="stage", doc="what is done, in sequence: one [[stage]] table each")
@@ -73,7 +88,7 @@ class ImpulseScenario(AnyScenario):
         yield from super().rules(given)
         good = given.good
         kinds, planes, packing = good.get("grains"), good.get("planes"), good.get("packing")
-        container, contact = good.get("container"), good.get("contact")
+        container = good.get("container")
         if kinds is not None and packing:
             yield from _bodies_are_there(given, kinds, packing)
         if kinds is not None:
@@ -83,23 +98,17 @@ class ImpulseScenario(AnyScenario):
             yield from _named_once("plane", [plane.name for plane in planes], walls)
         if packing and packing.method != "file" and kinds and container:
             yield from _room_to_pack(kinds, packing, container)
-        if None not in (kinds, planes, container, contact) and "terrain" in good and packing and packing.method != "file":
-            assert contact is not None
-            known = cls.model_construct(**good).materials
-            yield from _known_materials(contact, known)
-        output = good.get("output")
-        if kinds and output and packing and packing.method != "file":
-            total = sum(kind.count for kind in kinds)
-            if output.tracks:
-                yield from tracked_exist(output.tracks, total)
-            if output.check and planes is not None and container:
-                walls_and_planes = len(planes) + (4 + 1 + container.lid if container.width is not None else 0)
-                yield from _check_fits(output.check, total, walls_and_planes, container.gravity)
+        everything = {"grains", "contact", "container", "planes", "terrain", "packing", "output"}
+        if everything <= good.keys() and packing and packing.method != "file":
+            scenario = cls.model_construct(**good)
+            yield from _known_materials(scenario.contact, scenario.materials)
+            yield from _of_output(scenario)
 
     @property
     def materials(self) -> tuple[str, ...]:
         """Names of materials, each once: of the kinds of bodies, the container's walls, planes and terrain."""
-        named = [kind.material for kind in self.grains]
+        named = [*self._stored.materials] if self._stored else []
+        named += [kind.material for kind in self.grains]
         if self.container.width is not None:
             named.append(self.container.material)
         named += [plane.material for plane in self.planes]
@@ -115,8 +124,31 @@ class ImpulseScenario(AnyScenario):
 
     @property
     def grain_count(self) -> int:
-        """Number of bodies that the tables of grains have, those of a packing's file not counted."""
-        return sum(kind.count for kind in self.grains)
+        """Number of bodies, those of a packing's file included."""
+        return (len(self._stored) if self._stored else 0) + sum(kind.count for kind in self.grains)
+
+    @property
+    def stored(self) -> StoredBodies | None:
+        """The bodies of the packing's file, which come before those of [grains]; None without one."""
+        return self._stored
+
+    def read_packing(self) -> None:
+        """Reads the packing's file, if there is one. ScenarioError if it cannot be used."""
+        if self.packing.file is not None:
+            self._stored = read_stored_bodies(self.path_of(self.packing.file), self.packing.stage)
+
+    def rules_of_file(self) -> Iterator[Mistake]:
+        """What holds between the bodies of a packing's file, once it is read, and the scenario."""
+        assert self._stored is not None
+        for number, kind in enumerate(self.grains):
+            if kind.name in self._stored.groups:
+                rule = "is the name of a kind of bodies of packing.file"
+                yield Mistake(("grains", number, "name"), rule, "Give it another name")
+        yield from _known_materials(self.contact, self.materials)
+        yield from _of_output(self)
+
+    # The bodies of the packing's file, once `read_packing` has been called: its path starts in the scenario's folder.
+    _stored: StoredBodies | None = PrivateAttr(default=None)
 
     def path_of(self, name: str) -> Path:
         """Where a file is that the scenario names."""
@@ -159,7 +191,13 @@ def _named_once(table: str, names: Sequence[str], others: Sequence[str] = ()) ->
 
 
 def _room_to_pack(kinds: Sequence[BodyKind], packing: ImpulsePacking, container: ImpulseContainer) -> Iterator[Mistake]:
-    """There is somewhere to put bodies without position."""
+    """There is somewhere to put bodies without position, and it lies in the container."""
+    if packing.region and container.width is not None and container.breadth is not None:
+        most = (container.width, container.breadth, container.height or float("inf"))
+        for axis, end, low, high in zip("xyz", most, packing.region.low, packing.region.high, strict=True):
+            if low < 0.0 or high > end * (1.0 + 1e-12):
+                rule = f"reaches beyond the container, which goes from 0 m to {end:g} m along {axis}"
+                yield Mistake(("packing", "region"), rule, "Make it smaller, or leave it out")
     if packing.region or container.width is not None or all(kind.position is not None for kind in kinds):
         return
     number = next(k for k, kind in enumerate(kinds) if kind.position is None)
@@ -174,11 +212,23 @@ def _known_materials(contact: ImpulseContact, known: Sequence[str]) -> Iterator[
     for number, pair in enumerate(contact.pairs):
         for k, name in enumerate(pair.between):
             if name not in known:
-                yield Mistake(("contact", "pairs", number, "between", k), "is no material here", did_you_mean(name, list(known)))
+                yield Mistake(
+                    ("contact", "pairs", number, "between", k), "is no material here", did_you_mean(name, list(known))
+                )
+
+
+def _of_output(scenario: ImpulseScenario) -> Iterator[Mistake]:
+    """Tracked bodies are there, and the closed form that is asked for belongs to what the scenario has."""
+    output, container = scenario.output, scenario.container
+    if output.tracks:
+        yield from tracked_exist(output.tracks, scenario.grain_count)
+    if output.check and scenario.grain_count:
+        walls = (5 + container.lid) if container.width is not None else 0
+        planes = walls + len(scenario.planes) + (scenario.terrain is not None)
+        yield from _check_fits(output.check, scenario.grain_count, planes, container.gravity)
 
 
 def _check_fits(check: str, bodies: int, planes: int, gravity: float) -> Iterator[Mistake]:
-    """The closed form that is asked for belongs to what the scenario has."""
     wanted = {
         "drop": (bodies == 1 and planes == 1 and gravity > 0.0, "of one body above one plane, with gravity"),
         "slope": (bodies == 1 and planes == 1 and gravity > 0.0, "of one body on one plane, with gravity"),
@@ -187,5 +237,5 @@ def _check_fits(check: str, bodies: int, planes: int, gravity: float) -> Iterato
     }
     fits, words = wanted[check]
     if not fits:
-        has = f"here are {bodies} bodies and {planes} planes, gravity is {gravity:g} m/s^2"
+        has = f"here: bodies {bodies}, planes {planes}, gravity {gravity:g} m/s^2"
         yield Mistake(("output", "check"), f"is {words}; {has}", "Leave it out, or change the scenario")

@@ -63,10 +63,14 @@ class BodyKind(Table):
         None, "box: edge lengths along its x, y, z; one length for a cube", example=["2 m", "1 m", "2 m"]
     )
     face_points: Annotated[int, Whole(ge=0, le=100)] | None = key(
-        maker=_only("box", 0), doc="box: points on a face along each edge, to find contacts with, beside the corners (default: 0)", example=3
+        maker=_only("box", 0),
+        doc="box: points on a face along each edge, to find contacts with, beside the corners (default: 0)",
+        example=3,
     )
     radius: Radius | None = key(
-        None, "sphere: its radius; clump: unit of the template. One length, or a distribution (table grains.radius)", example="5 cm"
+        None,
+        "sphere: its radius; clump: unit of the template. One length, or a distribution (table grains.radius)",
+        example="5 cm",
     )
     template: SphereTemplate | None = key(
         maker=_only("clump", "tetrahedron"),
@@ -102,16 +106,22 @@ class BodyKind(Table):
         None, "centre of mass of the first at the start (default: placed by [packing])", example=["0 m", "0 m", "1.6 m"]
     )
     step: Point | None = key(
-        None, "with position: from each of the bodies to the next, for rows and stacks", example=["1.001 m", "0 m", "0 m"]
+        None,
+        "with position: from each of the bodies to the next, for rows and stacks",
+        example=["1.001 m", "0 m", "0 m"],
     )
     orientation: BodyOrientation = key(
         maker=_turned,
         doc="how the bodies are turned at the start (default: not with position, else random)",
         example={"axis": [0, 1, 0], "angle": "30 deg"},
     )
-    velocity: Velocity3 = key(["0 m/s", "0 m/s", "0 m/s"], "of the centre of mass at the start", example=["2 m/s", "0 m/s", "0 m/s"])
+    velocity: Velocity3 = key(
+        ["0 m/s", "0 m/s", "0 m/s"], "of the centre of mass at the start", example=["2 m/s", "0 m/s", "0 m/s"]
+    )
     spin: Spin3 = key(
-        ["0 rad/s", "0 rad/s", "0 rad/s"], "angular velocity at the start, in the axes of the container", example=["0 rad/s", "0 rad/s", "1 rad/s"]
+        ["0 rad/s", "0 rad/s", "0 rad/s"],
+        "angular velocity at the start, in the axes of the container",
+        example=["0 rad/s", "0 rad/s", "1 rad/s"],
     )
 
     elsewhere: ClassVar = {
@@ -132,9 +142,15 @@ class BodyKind(Table):
         if needed and needed[0] not in raw:
             yield Mistake((needed[0],), "is missing", f"Add for example {needed[1]}")
         if "step" in raw and "position" not in raw:
-            yield Mistake(("step",), "has no position that it goes on from", 'Add position = ["0 m", "0 m", "1 m"], or leave it out')
+            yield Mistake(
+                ("step",),
+                "has no position that it goes on from",
+                'Add position = ["0 m", "0 m", "1 m"], or leave it out',
+            )
         if "position" in raw and "step" not in raw and good.get("count", 1) > 1:
-            remedy = 'Add for example step = ["0 m", "0 m", "1 m"], or leave position out, so that [packing] places them'
+            remedy = (
+                'Add for example step = ["0 m", "0 m", "1 m"], or leave position out, so that [packing] places them'
+            )
             yield Mistake(("step",), f"is missing: all {good['count']} bodies would start at the same place", remedy)
         if good.get("step") == (0.0, 0.0, 0.0) and good.get("count", 1) > 1:
             yield Mistake(("step",), "puts all bodies at the same place", "Make one of its parts differ from 0")

@@ -10,7 +10,7 @@ from dem_cli.scenario.quantities import Angle, Duration, Number
 from dem_cli.scenario.stages import Run, Shake
 from dem_cli.scenario.table import Table, key
 
-RIGID = "explicit"
+EXPLICIT = "explicit"
 
 
 class ImpulseSettle(Table):
@@ -24,8 +24,8 @@ class ImpulseSettle(Table):
     )
 
     elsewhere: ClassVar = {
-        "unbalanced": (RIGID, "Leave it out: kinetic says when bodies are at rest"),
-        "damping": (RIGID, "Leave it out: bodies come to rest by restitution and friction"),
+        "unbalanced": (EXPLICIT, "Leave it out: kinetic says when bodies are at rest"),
+        "damping": (EXPLICIT, "Leave it out: bodies come to rest by restitution and friction"),
     }
 
     @property
@@ -39,6 +39,8 @@ class ImpulseShake(Shake):
 
     angle: Angle = key("0 deg", "direction of the shaking, from the horizontal upwards", example="0 deg")
     heading: Angle = key("0 deg", "direction of the shaking in plan, from +x towards +y", example="90 deg")
+
+    elsewhere: ClassVar = {}
 
 
 ImpulseStage = Annotated[ImpulseSettle | ImpulseShake | Run, Field(discriminator="kind")]

@@ -36,14 +36,19 @@ METHODS_OF = {
     "file": ("file",),
     "stage": ("file",),
 }
+KISHINO = ("alpha", "alpha_prime", "beta", "beta_prime")
 OF_ENERGY_TRACKING = {"quanta": 50, "iterations": 100000}
 
 
 class Pair(Table):
     """What holds between two materials, in place of the law of all."""
 
-    between: tuple[str, str] = key(doc="names of the two materials; twice the same for bodies of one", example=["rock", "slope"])
-    friction: Friction | None = key(None, "coefficient of friction, or the friction angle (default: that of all)", example=0.6)
+    between: tuple[str, str] = key(
+        doc="names of the two materials; twice the same for bodies of one", example=["rock", "slope"]
+    )
+    friction: Friction | None = key(
+        None, "coefficient of friction, or the friction angle (default: that of all)", example=0.6
+    )
     restitution: Restitution | None = key(None, "coefficient of restitution (default: that of all)", example=0.1)
 
     @classmethod
@@ -85,7 +90,9 @@ class ImpulseContainer(Table):
     width: Length | None = key(None, "inner width, x from 0; left out, there are no walls", example="1 m")
     breadth: Length | None = key(None, "inner breadth, y from 0", example="1 m")
     height: Length | None = key(
-        None, "height of the walls; left out, they have no upper end. What goes over them is lost and counted", example="2 m"
+        None,
+        "height of the walls; left out, they have no upper end. What goes over them is lost and counted",
+        example="2 m",
     )
     lid: Annotated[bool, Strict()] = key(False, "a wall on top, at height", example=False)
     material: str = key("wall", "name of the walls' material in contact.pairs", example="steel")
@@ -111,7 +118,9 @@ class Plane(Table):
     name: str = key("plane", 'name in reports, and in --set (default: "plane 1", ...)', example="slope")
     point: Point = key(ORIGIN, "a point on it", example=["0 m", "0 m", "1 m"])
     normal: Direction | None = key(
-        None, "direction at right angles to it, to the side of the bodies (default: upwards); or give slope", example=[0, 0, 1]
+        None,
+        "direction at right angles to it, to the side of the bodies (default: upwards); or give slope",
+        example=[0, 0, 1],
     )
     slope: Angle | None = key(
         None, "angle of a slope that falls towards +x, or towards heading; or give normal", example="30 deg"
@@ -138,6 +147,7 @@ class Plane(Table):
 
     @classmethod
     def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
+        del value
         return [("heading",)] if tuple(path) == ("normal",) else []
 
     @property
@@ -153,7 +163,7 @@ class TerrainTable(Table):
     """A fixed surface of triangles that bodies roll down, from a file."""
 
     file: str = key(
-        doc="mesh (OBJ, STL, PLY, ...), its normals to the side of the bodies; or CSV with header x,y,z: the heights z of a full grid of x and y",
+        doc="mesh (OBJ, STL, PLY, ...), looking to the bodies; or CSV with header x,y,z: heights z of a full grid of x and y",
         example="slope.obj",
     )
     file_unit: Literal["m", "cm", "mm"] = key("m", "unit of length in the file", example="cm")
@@ -173,7 +183,9 @@ class PackedRegion(Table):
     def rules(cls, given: Given) -> Iterator[Mistake]:
         low, high = given.good.get("low"), given.good.get("high")
         if low and high and any(a >= b for a, b in zip(low, high, strict=True)):
-            yield Mistake(("to",), "is not above from in each direction", "Make each of its parts larger than that of from")
+            yield Mistake(
+                ("to",), "is not above from in each direction", "Make each of its parts larger than that of from"
+            )
 
 
 class ImpulsePacking(Table):
@@ -191,7 +203,9 @@ class ImpulsePacking(Table):
         example={"from": ORIGIN, "to": ["1 m", "1 m", "2 m"]},
     )
     gap: Distance | None = key(
-        None, "least distance between bounding spheres (default: grid 5 % of the largest diameter, rejection 0)", example="1 mm"
+        None,
+        "least distance between bounding spheres (default: grid 5 % of the largest diameter, rejection 0)",
+        example="1 mm",
     )
     attempts: Annotated[int, Whole(ge=1)] | None = key(
         maker=lambda good: 1000 if good["method"] == "rejection" else None,
@@ -200,7 +214,9 @@ class ImpulsePacking(Table):
     )
     file: str | None = key(None, "file: result file of dem run (.h5) of this engine", example="pile.h5")
     stage: str | None = key(
-        None, "file: stage, by name, at whose end the bodies are taken (default: as they are in the last frame)", example="settle"
+        None,
+        "file: stage, by name, at whose end the bodies are taken (default: as they are in the last frame)",
+        example="settle",
     )
     overlaps: Literal["separate", "refuse"] = key(
         "separate",
@@ -209,10 +225,9 @@ class ImpulsePacking(Table):
     )
 
     elsewhere: ClassVar = {
-        **{
-            name: (EXPLICIT, "Leave it out; gap says how far bodies start apart")
-            for name in ("grid", "void_ratio", "height", "sweeps")
-        },
+        **dict.fromkeys(
+            ("grid", "void_ratio", "height", "sweeps"), (EXPLICIT, "Leave it out; gap says how far bodies start apart")
+        ),
         "file_unit": (EXPLICIT, "Leave it out: a result file is in metres"),
         **{
             f"method={name}": (EXPLICIT, 'Write method = "grid" or "rejection", and a stage that settles the bodies')
@@ -299,10 +314,10 @@ class ImpulseSolver(Table):
             f"method={name}": (QUASI_STATIC, 'Write method = "pgs" or "energy-tracking"')
             for name in ("momentum", "kishino")
         },
-        **{
-            name: (QUASI_STATIC, "Leave it out; tolerance says when a solve ends")
-            for name in ("sub_steps", "accuracy", "stress_tolerance", "max_iterations", "alpha", "alpha_prime", "beta", "beta_prime")
-        },
+        **dict.fromkeys(
+            ("sub_steps", "accuracy", "stress_tolerance", "max_iterations", *KISHINO),
+            (QUASI_STATIC, "Leave it out; tolerance says when a solve ends"),
+        ),
         "max_overlap": (QUASI_STATIC, "Give max_penetration in its place"),
     }
 
@@ -335,7 +350,9 @@ class ImpulseOutput(Table):
         None, "bodies that are followed closely", example={"grains": [0, 9], "interval": "1 ms"}
     )
     check: Literal["drop", "slope", "collision", "row"] | None = key(
-        None, "closed form that dem report sets beside the run: of one body that falls on a plane or slides down it, two bodies that collide, a row", example="drop"
+        None,
+        "closed form that dem report sets beside the run: of one body that falls on a plane or slides down it, two bodies that collide, a row",
+        example="drop",
     )
 
     elsewhere: ClassVar = {

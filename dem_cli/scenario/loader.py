@@ -24,7 +24,7 @@ from dem_cli.scenario.quasi_static import QuasiStaticScenario, unprepared
 from dem_cli.scenario.raw_record import RecordError
 from dem_cli.scenario.stages import Shake
 from dem_cli.scenario.stored_grains import StoredGrains, is_result_file, read_stored_grains
-from dem_cli.scenario.table import NOTHING
+from dem_cli.scenario.table import NOTHING, value_at
 
 Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
 
@@ -73,7 +73,10 @@ def parse_scenario(
             found.append((one["loc"], one["input"], ctx["rule"], ctx["remedy"]))
     from_file: list[Found] = []
     if kind is ImpulseScenario:
-        from_file += missing_files(raw, folder)
+        assert scenario is None or isinstance(scenario, ImpulseScenario)
+        said = [one[0] for one in found]
+        from_file += [one for one in _missing_files(raw, folder) if one[0] not in said]
+        from_file += [] if from_file else _stored_bodies(folder, scenario)
     elif not any(one[0] == ("packing", "file") for one in found):
         assert not isinstance(scenario, ImpulseScenario)
         from_file += _packing_file(raw, folder, scenario)
@@ -128,7 +131,7 @@ def _records(raw: dict[str, Any], folder: Path, scenario: EngineScenario | None)
     return found
 
 
-def missing_files(raw: dict[str, Any], folder: Path) -> list[Found]:
+def _missing_files(raw: dict[str, Any], folder: Path) -> list[Found]:
     """Files of bodies, terrain and packing that are named and not there."""
     grains = raw.get("grains")
     kinds = grains if isinstance(grains, list) else [grains]
@@ -140,6 +143,19 @@ def missing_files(raw: dict[str, Any], folder: Path) -> list[Found]:
         if isinstance(name, str) and not (folder / name).is_file():
             found.append((loc, name, "does not exist", "The path is taken from the scenario's folder"))
     return found
+
+
+def _stored_bodies(folder: Path, scenario: ImpulseScenario | None) -> list[Found]:
+    """Reads the bodies of a packing's file; mistakes of it, and of what disagrees with it."""
+    if scenario is None or scenario.packing.file is None:
+        return []
+    scenario._folder = folder
+    try:
+        scenario.read_packing()
+    except ScenarioError as error:
+        rule, _, remedy = str(error).removeprefix(f"{folder / scenario.packing.file}: ").rpartition(". ")
+        return [(("packing", "file"), scenario.packing.file, rule, remedy)]
+    return [(one.loc, value_at(scenario.to_dict(), one.loc), one.rule, one.remedy) for one in scenario.rules_of_file()]
 
 
 def _stored_shape(stored: StoredGrains, name: str, scenario: DiscScenario) -> list[Found]:

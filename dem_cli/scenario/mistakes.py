@@ -45,7 +45,18 @@ def place(loc: Sequence[str | int], raw: Mapping[str, Any]) -> str:
 
 
 LISTED = ("grains", "plane")
-TABLES = ("grains", "material", "contact", "container", "packing", "integration", "boundary", "solver", "output", "terrain")
+TABLES = (
+    "grains",
+    "material",
+    "contact",
+    "container",
+    "packing",
+    "integration",
+    "boundary",
+    "solver",
+    "output",
+    "terrain",
+)
 
 
 def _path(parts: Sequence[str | int]) -> str:

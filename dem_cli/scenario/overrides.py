@@ -15,7 +15,6 @@ from dem_cli.scenario.impulse_tables import Plane
 from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.table import Table, keys_of, nearest
 
-
 LISTED = ("grains", "plane")
 
 
@@ -75,7 +74,9 @@ def _set_listed(raw: dict[str, Any], parts: list[str], value: Any) -> None:
         raise _RefusedError(f"there is no {name} {parts[1]}", f"The scenario has {len(listed)}, counted from 1")
     if not chosen and len(listed) != 1:
         full = " or ".join(f"{name}.{own or k}.{'.'.join(rest)}" for k, own in enumerate(names, 1))
-        raise _RefusedError("may mean several tables" if listed else "there is none", f"Write {full}" if listed else f"Add [[{name}]]")
+        raise _RefusedError(
+            "may mean several tables" if listed else "there is none", f"Write {full}" if listed else f"Add [[{name}]]"
+        )
     if not rest:
         raise _RefusedError("names a table, but no key of it", f"Write for example --set {name}.{parts[1]}.name=first")
     before = parts[: len(parts) - len(rest)]

@@ -34,6 +34,8 @@ class QuasiStaticScenario(DiscScenario):
 
     stage_kinds: ClassVar[Mapping[str, type[Table]]] = LOADS
     elsewhere: ClassVar = {
+        "plane": ("impulse", "Leave it out; [boundary] says what encloses the sample"),
+        "terrain": ("impulse", "Leave it out; [boundary] says what encloses the sample"),
         "integration": (EXPLICIT, "Leave it out; how equilibrium is found is said in [solver]"),
         **{
             f"kind={kind}": (EXPLICIT, f'Write engine = "{EXPLICIT}", or one of {", ".join(LOADS)}')

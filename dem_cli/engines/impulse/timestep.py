@@ -14,23 +14,29 @@ PERIODS = 100.0  # steps at least in a period of the shaking
 
 
 def choose_time_step(scenario: ImpulseScenario, scene: Scene) -> float:
-    """The given time step [s], or by rule: at the largest speed to expect the smallest body moves by MOVED of its size.
-
-    A body's size is its reach. Rules that are tighter count, too: the given intervals of output, PERIODS steps in a period of a sine.
-    """
+    """The given time step [s], or that of the rule."""
     given = scenario.integration.time_step
-    if isinstance(given, float):
-        return given
-    size = smallest_size(scene)
-    limits = [MOVED * size / largest_speed(scenario, scene), scenario.output.interval, scenario.output.frames]
-    if scenario.output.tracks:
-        limits.append(scenario.output.tracks.interval)
-    limits += [
-        1.0 / (PERIODS * stage.frequency)
-        for stage in scenario.stages
-        if isinstance(stage, ImpulseShake) and stage.frequency
-    ]
-    return min(limits)
+    return given if isinstance(given, float) else min(time_step_limits(scenario, scene).values())
+
+
+def time_step_limits(scenario: ImpulseScenario, scene: Scene) -> dict[str, float]:
+    """What the rule takes the smallest of [s], by its reason.
+
+    "motion": in a step, at the largest speed to expect, no point of a body moves by more than MOVED of the smallest body's size, which is its
+    reach. The others: the intervals of output, PERIODS steps in a period of a sine.
+    """
+    size, output = smallest_size(scene), scenario.output
+    limits = {
+        "motion": MOVED * size / largest_speed(scenario, scene),
+        "output.interval": output.interval,
+        "output.frames": output.frames,
+    }
+    if output.tracks:
+        limits["output.tracks.interval"] = output.tracks.interval
+    for number, stage in enumerate(scenario.stages, 1):
+        if isinstance(stage, ImpulseShake) and stage.frequency:
+            limits[f"a hundredth of the period of stage {number}"] = 1.0 / (PERIODS * stage.frequency)
+    return limits
 
 
 def smallest_size(scene: Scene) -> float:
@@ -41,7 +47,7 @@ def smallest_size(scene: Scene) -> float:
 def largest_speed(scenario: ImpulseScenario, scene: Scene) -> float:
     """Speed [m/s] that the fastest point of a body comes to: as given, from the fall, and from the shaking.
 
-    At least that of a fall through half of the smallest body's reach, and so large that something happens in the time of the run.
+    At least that of a fall through half of the smallest body's reach; where nothing moves, one body size in the time of the run.
     """
     reach = np.array([shape.reach for shape in scene.shapes])[scene.bodies.shape] * scene.bodies.scale
     given = float(np.max(np.linalg.norm(scene.bodies.v, axis=1) + reach * np.linalg.norm(scene.bodies.w, axis=1)))
@@ -49,7 +55,7 @@ def largest_speed(scenario: ImpulseScenario, scene: Scene) -> float:
     time = sum(stage.longest for stage in scenario.stages)
     fall = min(math.sqrt(2.0 * g * fall_height(scenario, scene)), g * time)
     shaken = max((_ground_speed(stage) for stage in scenario.stages if isinstance(stage, ImpulseShake)), default=0.0)
-    return max(math.hypot(given, fall) + shaken, math.sqrt(g * size), size / time)
+    return max(math.hypot(given, fall) + shaken, math.sqrt(g * size)) or size / time
 
 
 def _ground_speed(stage: ImpulseShake) -> float:
