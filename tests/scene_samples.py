@@ -66,14 +66,23 @@ def planes_of(*rows: tuple[str, list[float], list[float]]) -> Planes:
     return Planes(tuple(row[0] for row in rows), point, normal, np.zeros(len(rows), dtype=np.int64), np.array(edges))
 
 
-def container(width: float, breadth: float) -> Planes:
-    return planes_of(
+def container(width: float, breadth: float, height: float = 3.0) -> Planes:
+    w, b, h = width, breadth, height
+    found = planes_of(
         ("left", [0, 0, 0], [1, 0, 0]),
         ("right", [width, 0, 0], [-1, 0, 0]),
         ("front", [0, 0, 0], [0, 1, 0]),
         ("back", [0, breadth, 0], [0, -1, 0]),
         ("bottom", [0, 0, 0], [0, 0, 1]),
     )
+    edge = [
+        [[0, 0, 0], [0, b, 0], [0, b, h], [0, 0, h]],
+        [[w, b, 0], [w, 0, 0], [w, 0, h], [w, b, h]],
+        [[w, 0, 0], [0, 0, 0], [0, 0, h], [w, 0, h]],
+        [[0, b, 0], [w, b, 0], [w, b, h], [0, b, h]],
+        [[0, 0, 0], [w, 0, 0], [w, b, 0], [0, b, 0]],
+    ]
+    return replace(found, edge=np.array(edge, dtype=float))
 
 
 def ramp() -> Terrain:

@@ -68,7 +68,7 @@ class BodyFrameWriter:
 
     def size(self, frame: BodyFrame) -> int:
         """Bytes that a frame takes, to within a few percent."""
-        return 116 * len(self._bodies) + 140 * (0 if frame.contacts is None else len(frame.contacts))
+        return 130 * len(self._bodies) + 120 * (0 if frame.contacts is None else len(frame.contacts))
 
     def append(self, frame: BodyFrame) -> int:
         """Hand one frame to HDF5. Returns its bytes."""
