@@ -151,7 +151,7 @@ def test_files_are_short(module: str) -> None:
     assert len(MODULES[module].read_text(encoding="utf-8").splitlines()) <= LONGEST
 
 
-HEAVY = ("numba", "matplotlib", "pydantic", "h5py", "pint", "scipy", "rich")
+HEAVY = ("numba", "matplotlib", "pydantic", "h5py", "pint", "scipy", "rich", "trimesh")
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["run", "--help"]], ids=" ".join)

@@ -66,9 +66,9 @@ ONE_LINE: list[tuple[dict[str, Any], str]] = [
     ({"stage": []}, 'stage = []: is empty. Add at least one stage: [[stage]] with kind = "compress"'),
     (
         {"engine": "granular"},
-        'engine = "granular": must be one of explicit, granular-element. Did you mean "granular-element"?',
+        'engine = "granular": must be one of explicit, granular-element, impulse. Did you mean "granular-element"?',
     ),
-    ({"engine": 3}, "engine = 3: must be one of explicit, granular-element"),
+    ({"engine": 3}, "engine = 3: must be one of explicit, granular-element, impulse"),
     # units
     (
         {"stage.0.stress": 15},

@@ -71,7 +71,7 @@ ONE_LINE: list[tuple[dict[str, Any], list[str]]] = [
     # choices
     (
         {"engine": "explict"},
-        ['engine = "explict": must be one of explicit, granular-element. Did you mean "explicit"?'],
+        ['engine = "explict": must be one of explicit, granular-element, impulse. Did you mean "explicit"?'],
     ),
     ({"contact.tension": "dampng"}, ['[contact] tension = "dampng": must be one of none, damping.', '"damping"?']),
     ({"stage.0.kind": "setle"}, ['[[stage]] 1 kind = "setle": must be one of settle, shake, run.', '"settle"?']),

@@ -9,11 +9,12 @@ import numpy as np
 from dem_cli.assembly.container import build_box, build_walls
 from dem_cli.assembly.packing import DENSEST, place_grains, starting_width
 from dem_cli.assembly.region import Tell
+from dem_cli.assembly.scene import build_scene
 from dem_cli.assembly.shapes import build_grains, draw_sizes
 from dem_cli.scenario import QuasiStaticScenario, Scenario
 from dem_cli.state import Bonds, Grains, Walls
 
-__all__ = ["Assembly", "build_assembly", "build_loose"]
+__all__ = ["Assembly", "build_assembly", "build_loose", "build_scene"]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from dem_cli.geometry.union import pieces
-from dem_cli.scenario import AnyScenario
+from dem_cli.scenario import DiscScenario
 from dem_cli.scenario.stored_grains import StoredGrains
 from dem_cli.state import Bonds, Floats, Grains
 
@@ -26,7 +26,7 @@ class Sizes:
         return len(self.radius)
 
 
-def draw_sizes(scenario: AnyScenario, generator: np.random.Generator) -> Sizes:
+def draw_sizes(scenario: DiscScenario, generator: np.random.Generator) -> Sizes:
     """Radii, then aspect ratios, then orientations are drawn, those that a packing file does not give; discs draw radii alone."""
     grains, count = scenario.grains, scenario.grain_count
     file = scenario.grain_file() if scenario.packing.file else None
@@ -60,7 +60,7 @@ class Body:
     inertia: Floats
 
 
-def body_of(scenario: AnyScenario) -> Body:
+def body_of(scenario: DiscScenario) -> Body:
     """The discs of a scenario's template, each with the mass of its own piece of the outline at its centre.
 
     These masses have the centre of the union (see `Pieces`). Bonded discs turn as discs of their mass. Those of a clump share
@@ -79,7 +79,7 @@ def body_of(scenario: AnyScenario) -> Body:
 
 
 def build_grains(
-    scenario: AnyScenario,
+    scenario: DiscScenario,
     sizes: Sizes,
     x: Floats,
     y: Floats,
@@ -118,7 +118,7 @@ def build_grains(
     return grains, _bonds(scenario, grains, many) if scenario.grains.bond else Bonds.none()
 
 
-def stored_grains(scenario: AnyScenario, stored: StoredGrains) -> tuple[Grains, Bonds]:
+def stored_grains(scenario: DiscScenario, stored: StoredGrains) -> tuple[Grains, Bonds]:
     """Elements as a result file holds them, with the masses and bonds that the scenario asks for."""
     density, depth = scenario.grains.density, scenario.depth
     grains = Grains.ellipses(stored.x, stored.y, stored.a, stored.b, stored.angle, density, depth)
@@ -134,7 +134,7 @@ def stored_grains(scenario: AnyScenario, stored: StoredGrains) -> tuple[Grains, 
     return grains, _bonds(scenario, grains, len(body.x)) if scenario.grains.bond else Bonds.none()
 
 
-def _bonds(scenario: AnyScenario, grains: Grains, many: int) -> Bonds:
+def _bonds(scenario: DiscScenario, grains: Grains, many: int) -> Bonds:
     """The bonds of all grains, grain after grain."""
     bond, template = scenario.grains.bond, scenario.grains.template
     assert bond is not None

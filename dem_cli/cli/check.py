@@ -12,8 +12,9 @@ from dem_cli.units import human
 
 if TYPE_CHECKING:
     from dem_cli.cli.derived import Derived
+    from dem_cli.cli.derived_impulse import DerivedImpulse
     from dem_cli.cli.derived_quasi_static import DerivedQuasiStatic
-    from dem_cli.scenario import QuasiStaticScenario, Scenario
+    from dem_cli.scenario import EngineScenario, Scenario
 
 
 @click.command(name="check", short_help="Check a scenario; print derived constants, time step, run time.")
@@ -26,7 +27,8 @@ def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved:
 
     Prints all mistakes, or what follows from the scenario: sizes and masses, stiffness and wave speeds, the time step beside its
     stability limit and the thesis' rule, and the steps, file size and run time to expect. Of quasi-static tests: the box and its void
-    ratio, accuracy in force, expected overlap, and the increments of each stage.
+    ratio, accuracy in force, expected overlap, and the increments of each stage. Of rigid bodies: sizes, masses and what contacts are found
+    with, the pairs of materials, the time step and its rule.
     """
     from dem_cli.scenario import load_scenario
 
@@ -47,11 +49,17 @@ def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved:
 
 
 def derive_any(
-    scenario: Scenario | QuasiStaticScenario,
-) -> tuple[Derived | DerivedQuasiStatic, list[tuple[str, str]]]:
+    scenario: EngineScenario,
+) -> tuple[Derived | DerivedQuasiStatic | DerivedImpulse, list[tuple[str, str]]]:
     """What follows from a scenario, and the lines that say it, by its engine."""
-    from dem_cli.scenario import Scenario
+    from dem_cli.scenario import ImpulseScenario, Scenario
 
+    if isinstance(scenario, ImpulseScenario):
+        from dem_cli.cli.check_impulse import rows as impulse_rows
+        from dem_cli.cli.derived_impulse import derive_impulse
+
+        bodies = derive_impulse(scenario)
+        return bodies, impulse_rows(scenario, bodies)
     if isinstance(scenario, Scenario):
         from dem_cli.cli.derived import derive
 

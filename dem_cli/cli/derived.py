@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dem_cli.scenario import AnyScenario, Scenario, Settle, Shake
+from dem_cli.scenario import DiscScenario, Scenario, Settle, Shake
 from dem_cli.scenario.packing import USUAL
 from dem_cli.scenario.restitution import restitution
 from dem_cli.state import Floats
@@ -200,7 +200,7 @@ def _packing_height(scenario: Scenario, mass: float) -> float | None:
     return packing.region_height(scenario.container.width, mass / (scenario.grains.density * scenario.depth))
 
 
-def packing_seconds(scenario: AnyScenario, grains: int) -> float:
+def packing_seconds(scenario: DiscScenario, grains: int) -> float:
     """Time that the packing itself takes [s], a guess."""
     if not scenario.packing.random:
         return 0.0
@@ -241,13 +241,13 @@ def _warnings(scenario: Scenario, overlap: float, creep: float | None) -> list[s
         )
     for number, stage in enumerate(scenario.stages, 1):
         if isinstance(stage, Shake):
-            said += [f"stage {number} {words}" for words in _about_shaking(stage, scenario.output.interval)]
+            said += [f"stage {number} {words}" for words in about_shaking(stage, scenario.output.interval)]
     if scenario.integration.integrator == "thesis" and max(scenario.contact.damping()) < 0.05:
         said.append('integrator = "thesis" gains energy, and there is little damping to take it away')
     return said
 
 
-def _about_shaking(stage: Shake, interval: float) -> Iterator[str]:
+def about_shaking(stage: Shake, interval: float) -> Iterator[str]:
     """What is odd about a shaking whose series has rows every `interval` [s]."""
     if (motion := stage.motion) is not None:
         for one in motion.components:

@@ -27,13 +27,6 @@ class AnyScenario(Table):
     seed: Annotated[int, Whole(ge=0)] = key(
         0, "seed of all random numbers; the same seed gives the same run", example=2010
     )
-    depth: Length = key("1 m", "depth of the grains, which are cylinders, into the plane", example="1 m")
-    grains: Grains = key(doc="the grains")
-    material: Material = key(doc="stiffness of contacts")
-    contact: Table = key(doc="the law of contacts")
-    container: Table = key(doc="walls and gravity")
-    packing: Packing = key(doc="where the grains are at the start")
-    stages: tuple[Any, ...] = key(alias="stage", doc="what is done, in sequence: one [[stage]] table each")
 
     _source: str = PrivateAttr(default="")
     _path: Path | None = PrivateAttr(default=None)
@@ -47,23 +40,9 @@ class AnyScenario(Table):
         return list(cls.stage_kinds)
 
     @classmethod
-    def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
-        if tuple(path) != ("packing", "file"):
-            return []
-        given = ("radius", "count", *(("aspect_ratio", "orientation") if is_result_file(str(value)) else ()))
-        return [("grains", name) for name in given]
-
-    @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
-        good = given.good
-        if good.get("stages") == ():
+        if given.good.get("stages") == ():
             yield Mistake(("stage",), "is empty", f'Add at least one stage: [[stage]] with kind = "{cls.kinds()[0]}"')
-        grains, packing = good.get("grains"), good.get("packing")
-        if grains and packing:
-            yield from _where_sizes_come_from(grains, packing)
-        output = good.get("output")
-        if grains and packing and output and output.tracks and not packing.file:
-            yield from tracked_exist(output.tracks, grains.number * grains.elements)
 
     @property
     def source(self) -> str:
@@ -74,26 +53,6 @@ class AnyScenario(Table):
     def path(self) -> Path | None:
         """The scenario's file, if it came from one."""
         return self._path
-
-    def grain_file(self) -> GrainFile:
-        """The grains of `packing.file`, in metres. ScenarioError if there is none or it cannot be read."""
-        packing = self.packing
-        return read_grain_file(self._folder / (packing.file or ""), packing.file_unit, packing.stage)
-
-    @property
-    def grain_count(self) -> int:
-        """Number of grains, wherever it is given; a grain of several discs is one."""
-        return len(self.grain_file().x) if self.packing.file else self.grains.number
-
-    @property
-    def element_count(self) -> int:
-        """Number of discs and ellipses that the grains are made of, which is what ids count."""
-        return self.grain_count * self.grains.elements
-
-    @property
-    def stiffness(self) -> tuple[float, float]:
-        """kn, ks [N/m] of a contact."""
-        return self.material.stiffness(self.grains.density, self.depth)
 
     def to_dict(self) -> dict[str, Any]:
         """The resolved scenario as TOML data: all defaults, quantities as strings in SI units."""
@@ -123,13 +82,67 @@ class AnyScenario(Table):
         return hash(self.hash)
 
 
+class DiscScenario(AnyScenario):
+    """A scenario of grains in the plane: cylinders whose contacts have a stiffness."""
+
+    depth: Length = key(
+        "1 m", "depth of the grains, which are cylinders, into the plane (not with impulse)", example="1 m"
+    )
+    grains: Grains = key(doc="the grains")
+    material: Material = key(doc="stiffness of contacts")
+    contact: Table = key(doc="the law of contacts")
+    container: Table = key(doc="walls and gravity")
+    packing: Packing = key(doc="where the grains are at the start")
+    stages: tuple[Any, ...] = key(alias="stage", doc="what is done, in sequence: one [[stage]] table each")
+
+    @classmethod
+    def displaced(cls, path: Sequence[str], value: Any) -> list[tuple[str, ...]]:
+        if tuple(path) != ("packing", "file"):
+            return []
+        given = ("radius", "count", *(("aspect_ratio", "orientation") if is_result_file(str(value)) else ()))
+        return [("grains", name) for name in given]
+
+    @classmethod
+    def rules(cls, given: Given) -> Iterator[Mistake]:
+        yield from super().rules(given)
+        good = given.good
+        grains, packing = good.get("grains"), good.get("packing")
+        if grains and packing:
+            yield from _where_sizes_come_from(grains, packing)
+        output = good.get("output")
+        if grains and packing and output and output.tracks and not packing.file:
+            yield from tracked_exist(output.tracks, grains.number * grains.elements)
+
+    def grain_file(self) -> GrainFile:
+        """The grains of `packing.file`, in metres. ScenarioError if there is none or it cannot be read."""
+        packing = self.packing
+        return read_grain_file(self._folder / (packing.file or ""), packing.file_unit, packing.stage)
+
+    @property
+    def grain_count(self) -> int:
+        """Number of grains, wherever it is given; a grain of several discs is one."""
+        return len(self.grain_file().x) if self.packing.file else self.grains.number
+
+    @property
+    def element_count(self) -> int:
+        """Number of discs and ellipses that the grains are made of, which is what ids count."""
+        return self.grain_count * self.grains.elements
+
+    @property
+    def stiffness(self) -> tuple[float, float]:
+        """kn, ks [N/m] of a contact."""
+        return self.material.stiffness(self.grains.density, self.depth)
+
+
 def files_named(raw: Mapping[str, Any]) -> list[str]:
-    """Paths of the files that a scenario's TOML data name: grains and records, as far as they are well-formed; each once."""
+    """Paths of the files that a scenario's TOML data name: grains, shapes, terrain and records, as far as they are well-formed; each once."""
 
     def table(value: Any) -> Mapping[str, Any]:
         return value if isinstance(value, Mapping) else {}
 
-    named = [table(raw.get("packing")).get("file")]
+    named = [table(raw.get(name)).get("file") for name in ("packing", "grains", "terrain")]
+    kinds = raw.get("grains")
+    named += [table(kind).get("file") for kind in kinds] if isinstance(kinds, list) else []
     stages = raw.get("stage")
     for stage in stages if isinstance(stages, list) else []:
         record = table(stage).get("record")

@@ -14,21 +14,22 @@ from pydantic import ValidationError
 from dem_cli import units
 from dem_cli.errors import ScenarioError
 from dem_cli.scenario import mistakes
-from dem_cli.scenario.base import AnyScenario, tracked_exist
-from dem_cli.scenario.engines import engine_of, unknown_engine
+from dem_cli.scenario.base import AnyScenario, DiscScenario, tracked_exist
+from dem_cli.scenario.engines import EngineScenario, engine_of, stages_of, unknown_engine
 from dem_cli.scenario.grain_file import SCALE, read_grain_file
+from dem_cli.scenario.impulse import ImpulseScenario
 from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.overrides import apply_overrides
 from dem_cli.scenario.quasi_static import QuasiStaticScenario, unprepared
 from dem_cli.scenario.raw_record import RecordError
 from dem_cli.scenario.stages import Shake
 from dem_cli.scenario.stored_grains import StoredGrains, is_result_file, read_stored_grains
-from dem_cli.scenario.table import NOTHING
+from dem_cli.scenario.table import NOTHING, value_at
 
 Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
 
 
-def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario | QuasiStaticScenario:
+def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> EngineScenario:
     """The scenario of a TOML file, changed by `overrides` ("contact.friction=0.3"). ScenarioError holds a line per mistake."""
     path = Path(path)
     try:
@@ -48,7 +49,7 @@ def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> Scenario |
 
 def parse_scenario(
     text: str, origin: str = "<text>", folder: str | Path = ".", overrides: Iterable[str] = ()
-) -> Scenario | QuasiStaticScenario:
+) -> EngineScenario:
     """The scenario that `text` holds. origin: its name in messages. folder: where paths in it start."""
     try:
         raw = tomllib.loads(text)
@@ -62,7 +63,7 @@ def parse_scenario(
         lines.append(mistakes.line(origin, loc, raw["engine"], rule, remedy, raw))
         raise ScenarioError("\n".join(lines))
     _width_of_file(raw, folder, kind)
-    scenario: Scenario | QuasiStaticScenario | None = None
+    scenario: EngineScenario | None = None
     found: list[Found] = []
     try:
         scenario = kind.model_validate(raw)
@@ -70,7 +71,15 @@ def parse_scenario(
         for one in error.errors(include_url=False):
             ctx = one["ctx"]
             found.append((one["loc"], one["input"], ctx["rule"], ctx["remedy"]))
-    from_file = [] if any(one[0] == ("packing", "file") for one in found) else _packing_file(raw, folder, scenario)
+    from_file: list[Found] = []
+    if kind is ImpulseScenario:
+        assert scenario is None or isinstance(scenario, ImpulseScenario)
+        said = [one[0] for one in found]
+        from_file += [one for one in _missing_files(raw, folder) if one[0] not in said]
+        from_file += [] if from_file else _stored_bodies(folder, scenario)
+    elif not any(one[0] == ("packing", "file") for one in found):
+        assert not isinstance(scenario, ImpulseScenario)
+        from_file += _packing_file(raw, folder, scenario)
     from_file += _records(raw, folder, scenario)
     order = list(raw)
     found.sort(key=lambda one: order.index(str(one[0][0])) if one[0][0] in order else len(order))
@@ -98,7 +107,7 @@ def _width_of_file(raw: dict[str, Any], folder: Path, kind: type[AnyScenario]) -
         raw["container"] = {**given, "width": units.write(stored.width, "m")}
 
 
-def _records(raw: dict[str, Any], folder: Path, scenario: AnyScenario | None) -> list[Found]:
+def _records(raw: dict[str, Any], folder: Path, scenario: EngineScenario | None) -> list[Found]:
     """Reads the records of shaking into their stages; their mistakes, also where the scenario has others."""
     found: list[Found] = []
     tables = raw.get("stage")
@@ -106,7 +115,7 @@ def _records(raw: dict[str, Any], folder: Path, scenario: AnyScenario | None) ->
         if not (isinstance(table, dict) and table.get("kind") == "shake" and "record" in table):
             continue
         try:
-            stage = scenario.stages[number] if scenario else Shake.model_validate(table)
+            stage: Any = scenario.stages[number] if scenario else stages_of(raw)["shake"].model_validate(table)
         except ValidationError:
             continue
         assert isinstance(stage, Shake)
@@ -122,7 +131,34 @@ def _records(raw: dict[str, Any], folder: Path, scenario: AnyScenario | None) ->
     return found
 
 
-def _stored_shape(stored: StoredGrains, name: str, scenario: AnyScenario) -> list[Found]:
+def _missing_files(raw: dict[str, Any], folder: Path) -> list[Found]:
+    """Files of bodies, terrain and packing that are named and not there."""
+    grains = raw.get("grains")
+    kinds = grains if isinstance(grains, list) else [grains]
+    places: list[tuple[tuple[str | int, ...], Any]] = [(("grains", k, "file"), kind) for k, kind in enumerate(kinds)]
+    places += [((name, "file"), raw.get(name)) for name in ("terrain", "packing")]
+    found: list[Found] = []
+    for loc, table in places:
+        name = table.get("file") if isinstance(table, dict) else None
+        if isinstance(name, str) and not (folder / name).is_file():
+            found.append((loc, name, "does not exist", "The path is taken from the scenario's folder"))
+    return found
+
+
+def _stored_bodies(folder: Path, scenario: ImpulseScenario | None) -> list[Found]:
+    """Reads the bodies of a packing's file; mistakes of it, and of what disagrees with it."""
+    if scenario is None or scenario.packing.file is None:
+        return []
+    scenario._folder = folder
+    try:
+        scenario.read_packing()
+    except ScenarioError as error:
+        rule, _, remedy = str(error).removeprefix(f"{folder / scenario.packing.file}: ").rpartition(". ")
+        return [(("packing", "file"), scenario.packing.file, rule, remedy)]
+    return [(one.loc, value_at(scenario.to_dict(), one.loc), one.rule, one.remedy) for one in scenario.rules_of_file()]
+
+
+def _stored_shape(stored: StoredGrains, name: str, scenario: DiscScenario) -> list[Found]:
     """Grains of a result file are of the scenario's shape; bonded grains and clumps of one template may stand for each other."""
     shape, elements = scenario.grains.shape, scenario.grains.elements
     alike = {"bonded": "clump", "clump": "bonded"}

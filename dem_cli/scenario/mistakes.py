@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dem_cli.scenario.engines import ALL_STAGES
+from dem_cli.scenario.impulse import names_in
 from dem_cli.scenario.table import NOTHING, toml_text
 
 LONGEST = 60  # characters of a value that a line shows
@@ -31,13 +32,31 @@ def place(loc: Sequence[str | int], raw: Mapping[str, Any]) -> str:
         if len(parts) > 2 and parts[2] in ALL_STAGES:  # the model names the kind that it took the stage for
             del parts[2]
         return f"[[stage]] {number + 1}{f' ({kind})' if kind in ALL_STAGES else ''} {_path(parts[2:])}".rstrip()
+    if parts[0] in LISTED and len(parts) > 1 and isinstance(parts[1], int) and isinstance(raw.get(str(parts[0])), list):
+        listed = raw[str(parts[0])]
+        name = names_in(str(parts[0]), listed)[parts[1]] if parts[1] < len(listed) else ""
+        return f"[[{parts[0]}]] {parts[1] + 1}{f' ({name})' if name else ''} {_path(parts[2:])}".rstrip()
+    if parts[0] in LISTED and len(parts) > 1 and isinstance(parts[1], int):
+        del parts[1]  # a single table, which the model holds as a list of one
     if len(parts) == 1:
         table = parts[0] in TABLES
         return f"[{parts[0]}]" if table else str(parts[0])
     return f"[{parts[0]}] {_path(parts[1:])}"
 
 
-TABLES = ("grains", "material", "contact", "container", "packing", "integration", "boundary", "solver", "output")
+LISTED = ("grains", "plane")
+TABLES = (
+    "grains",
+    "material",
+    "contact",
+    "container",
+    "packing",
+    "integration",
+    "boundary",
+    "solver",
+    "output",
+    "terrain",
+)
 
 
 def _path(parts: Sequence[str | int]) -> str:

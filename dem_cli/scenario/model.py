@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from dem_cli.scenario.base import AnyScenario, grid_fits, largest_fits
+from dem_cli.scenario.base import DiscScenario, grid_fits, largest_fits
 from dem_cli.scenario.packing import Packing
 from dem_cli.scenario.quantities import JsonSchema
 from dem_cli.scenario.stages import STAGES, Stage
@@ -13,15 +13,16 @@ from dem_cli.scenario.stored_grains import RESULT_FILE
 from dem_cli.scenario.table import Given, Mistake, Table, key
 from dem_cli.scenario.tables import Contact, Container, Grains, Integration, Output
 
-QUASI_STATIC = "granular-element"
+QUASI_STATIC, IMPULSE = "granular-element", "impulse"
 
 
-class Scenario(AnyScenario):
+class Scenario(DiscScenario):
     """A scenario of explicit DEM, complete and consistent: every default filled in, every rule checked."""
 
     engine: Literal["explicit"] = key(
         "explicit",
-        'method of simulation: "explicit", explicit DEM; "granular-element", quasi-static tests by the granular element method',
+        'method of simulation: "explicit", explicit DEM; "granular-element", quasi-static tests by the granular element method; '
+        '"impulse", rigid bodies in three dimensions moved by impulses',
         example="explicit",
     )
     contact: Contact = key(doc="the law of contacts")
@@ -33,6 +34,8 @@ class Scenario(AnyScenario):
     stage_kinds: ClassVar[Mapping[str, type[Table]]] = STAGES
     elsewhere: ClassVar = {
         "boundary": (QUASI_STATIC, "Leave it out: this engine has walls"),
+        "plane": (IMPULSE, "Leave it out: this engine has the walls of its container"),
+        "terrain": (IMPULSE, "Leave it out: this engine has the walls of its container"),
         "solver": (QUASI_STATIC, "Leave it out; how this engine steps time is said in [integration]"),
         **{
             f"kind={kind}": (QUASI_STATIC, f'Write engine = "{QUASI_STATIC}", or one of {", ".join(STAGES)}')

@@ -8,9 +8,14 @@ import typing
 from collections.abc import Iterable
 from typing import Any
 
-from dem_cli.scenario.engines import ALL_STAGES, engine_of
+from dem_cli.scenario.engines import ALL_STAGES, engine_of, stages_of
+from dem_cli.scenario.impulse import ImpulseScenario, names_in
+from dem_cli.scenario.impulse_bodies import BodyKind
+from dem_cli.scenario.impulse_tables import Plane
 from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.table import Table, keys_of, nearest
+
+LISTED = ("grains", "plane")
 
 
 class _RefusedError(Exception):
@@ -47,9 +52,36 @@ def _apply(raw: dict[str, Any], override: str) -> None:
     if parts[0] == "stage" and len(parts) > 1:
         for stage in _stages(raw, parts):
             rest = parts[2:] if _is_selector(raw, parts[1]) else parts[1:]
-            _set(ALL_STAGES[stage["kind"]], stage, rest, value, parts[: len(parts) - len(rest)])
+            _set(stages_of(raw)[stage["kind"]], stage, rest, value, parts[: len(parts) - len(rest)])
+    elif parts[0] in LISTED and len(parts) > 1 and engine_of(raw) is ImpulseScenario:
+        _set_listed(raw, parts, value)
     else:
         _set(engine_of(raw) or Scenario, raw, parts, value, [])
+
+
+def _set_listed(raw: dict[str, Any], parts: list[str], value: Any) -> None:
+    """Sets grains.KEY of the only kind of bodies, or grains.WHICH.KEY by number (from 1) or name; planes alike."""
+    name = parts[0]
+    listed = raw.get(name, [])
+    if isinstance(listed, dict):
+        listed = raw[name] = [listed]
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        raise _RefusedError("is not a list of tables in the scenario", f"Write [[{name}]] there")
+    names = names_in(name, listed)
+    chosen = [k for k, own in enumerate(names) if parts[1] in (str(k + 1), own)]
+    rest = parts[2:] if chosen else parts[1:]
+    if not chosen and parts[1].isdigit():
+        raise _RefusedError(f"there is no {name} {parts[1]}", f"The scenario has {len(listed)}, counted from 1")
+    if not chosen and len(listed) != 1:
+        full = " or ".join(f"{name}.{own or k}.{'.'.join(rest)}" for k, own in enumerate(names, 1))
+        raise _RefusedError(
+            "may mean several tables" if listed else "there is none", f"Write {full}" if listed else f"Add [[{name}]]"
+        )
+    if not rest:
+        raise _RefusedError("names a table, but no key of it", f"Write for example --set {name}.{parts[1]}.name=first")
+    before = parts[: len(parts) - len(rest)]
+    for k in chosen or [0]:
+        _set(BodyKind if name == "grains" else Plane, listed[k], rest, value, before)
 
 
 def _value(text: str) -> Any:

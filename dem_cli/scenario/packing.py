@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from dem_cli.scenario.quantities import Distance, Length, Number, Whole
 from dem_cli.scenario.stored_grains import is_result_file
@@ -96,6 +96,13 @@ class Packing(Table):
         doc="local-move: moves that each grain tries on average at most (default: 3000)",
         example=3000,
     )
+
+    elsewhere: ClassVar = {
+        **dict.fromkeys(
+            ("region", "gap", "overlaps"), ("impulse", "Leave it out; width, height and void_ratio say what is filled")
+        ),
+        "method=grid": ("impulse", 'Write method = "falling", and the grid'),
+    }
 
     @property
     def random(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
-from dem_cli.scenario.base import AnyScenario, grid_fits, largest_fits
+from dem_cli.scenario.base import DiscScenario, grid_fits, largest_fits
 from dem_cli.scenario.loads import LOADS, Compress, Cyclic, Load, Loading, QuasiStaticStage, Shear
 from dem_cli.scenario.quasi_static_tables import (
     EXPLICIT,
@@ -19,7 +19,7 @@ from dem_cli.scenario.stored_grains import is_result_file
 from dem_cli.scenario.table import Given, Mistake, Table, did_you_mean, key
 
 
-class QuasiStaticScenario(AnyScenario):
+class QuasiStaticScenario(DiscScenario):
     """A scenario of the granular element method, complete and consistent: every default filled in, every rule checked."""
 
     engine: Literal["granular-element"] = key(
@@ -34,6 +34,8 @@ class QuasiStaticScenario(AnyScenario):
 
     stage_kinds: ClassVar[Mapping[str, type[Table]]] = LOADS
     elsewhere: ClassVar = {
+        "plane": ("impulse", "Leave it out; [boundary] says what encloses the sample"),
+        "terrain": ("impulse", "Leave it out; [boundary] says what encloses the sample"),
         "integration": (EXPLICIT, "Leave it out; how equilibrium is found is said in [solver]"),
         **{
             f"kind={kind}": (EXPLICIT, f'Write engine = "{EXPLICIT}", or one of {", ".join(LOADS)}')

@@ -20,7 +20,7 @@ from dem_cli.scenario.quantities import (
 from dem_cli.scenario.table import Given, Mistake, Table, key, misplaced
 from dem_cli.scenario.tables import Followed, WallFriction
 
-EXPLICIT = "explicit"
+EXPLICIT, IMPULSE = "explicit", "impulse"
 UNDAMPED = "Leave it out: a quasi-static test has no damping"
 # Keys that only some boundaries, and some solvers, have.
 BOUNDARIES_OF = {"radius": ("chain", "membrane"), "link_stiffness": ("membrane",)}
@@ -50,6 +50,7 @@ class QuasiStaticContact(Table):
     elsewhere: ClassVar = {
         "damping_ratio": (EXPLICIT, UNDAMPED),
         "restitution": (EXPLICIT, UNDAMPED),
+        "pairs": (IMPULSE, "Leave it out; wall_friction says what differs at walls"),
         "tension": (EXPLICIT, UNDAMPED),
         "slider": (EXPLICIT, UNDAMPED),
         "ellipse_test": (EXPLICIT, "Leave it out: this engine moves discs"),
@@ -69,6 +70,8 @@ class QuasiStaticContainer(Table):
 
     elsewhere: ClassVar = {
         "height": (EXPLICIT, "Leave it out: the top wall lies on the packing; packing.height says how high that is"),
+        "breadth": (IMPULSE, "Leave it out: grains lie in a plane, depth says how long they are"),
+        "material": (IMPULSE, "Leave it out; contact.wall_friction says what differs at walls"),
         "lid": (EXPLICIT, "Leave it out: there is always a top wall, which lies on the packing"),
     }
 
@@ -158,6 +161,17 @@ class Solver(Table):
     short_form: ClassVar[JsonSchema | None] = {"enum": ["momentum", "kishino"], "description": "the method alone"}
     short_words: ClassVar[str | None] = '`"momentum"` or `"kishino"`'
 
+    elsewhere: ClassVar = {
+        **{
+            f"method={name}": (IMPULSE, 'Write method = "momentum" or "kishino"') for name in ("pgs", "energy-tracking")
+        },
+        **dict.fromkeys(
+            ("quanta", "iterations", "sweeps", "tolerance", "rest_speed", "correction", "slop"),
+            (IMPULSE, "Leave it out; accuracy says when equilibrium is found"),
+        ),
+        "max_penetration": (IMPULSE, "Give max_overlap in its place"),
+    }
+
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
         return {"method": raw} if isinstance(raw, str) else raw
@@ -189,5 +203,6 @@ class QuasiStaticOutput(Table):
     elsewhere: ClassVar = {
         "interval": (EXPLICIT, "Leave it out: the series has a row for each increment"),
         "surface_bins": (EXPLICIT, "Leave it out: the sample has no free surface"),
+        "check": (IMPULSE, "Leave it out"),
         "window": (EXPLICIT, "Leave it out: measures are those of the whole sample"),
     }

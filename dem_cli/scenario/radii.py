@@ -24,6 +24,8 @@ class Normal(Table):
     min: Length = key(doc="smallest radius", example="5 mm")
     max: Length = key(doc="largest radius", example="10 mm")
 
+    unit: ClassVar[str] = " m"
+
     @property
     def share(self) -> float:
         """Probability of the window from min to max."""
@@ -36,7 +38,9 @@ class Normal(Table):
         if not {"min", "max"} <= good.keys():
             return
         if good["min"] >= good["max"]:
-            yield Mistake(("min",), "must be smaller than max", f"Swap them, or raise max above {good['min']:g} m")
+            yield Mistake(
+                ("min",), "must be smaller than max", f"Swap them, or raise max above {good['min']:g}{cls.unit}"
+            )
         elif {"mean", "sd"} <= good.keys() and (share := cls.model_construct(**good).share) < 0.01:
             rule = f"leaves, up to max, only {share:.1g} of the normal distribution; 0.01 is the least"
             yield Mistake(("min",), rule, "Widen the window, or move mean into it")
@@ -79,20 +83,21 @@ class Grading(Table):
                 ("passing",), f"has {len(passing)} values for {len(sieve)} sieves", "Give one percentage for each sieve"
             )
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """`count` radii [m] whose mass follows the curve.
+    def draw(self, rng: np.random.Generator, count: int, dimensions: int = 2) -> Floats:
+        """`count` radii [m] whose mass follows the curve; dimensions: 2 for discs, 3 for spheres.
 
-        Mass per ln d is constant between two sieves a < b, and a disc's mass goes with d^2, so their number per d goes with
-        d^-3: a segment that holds the share w of mass holds the number w (a^-2 - b^-2) / (2 ln(b/a)), and within it d^-2
+        Mass per ln d is constant between two sieves a < b, and a disc's mass goes with d^k, k = 2, so their number per d goes with
+        d^-(k+1): a segment that holds the share w of mass holds the number w (a^-k - b^-k) / (k ln(b/a)), and within it d^-k
         is uniform.
         """
         d = np.array(self.sieve)
         mass = np.diff(self.passing)
-        inverse = d**-2.0
-        number = mass * -np.diff(inverse) / (2.0 * np.diff(np.log(d)))
+        inverse = d ** -float(dimensions)
+        number = mass * -np.diff(inverse) / (dimensions * np.diff(np.log(d)))
         segment = rng.choice(len(number), size=count, p=number / number.sum())
         coarse, fine = inverse[segment + 1], inverse[segment]
-        return 0.5 / np.sqrt(coarse + (fine - coarse) * rng.random(count))
+        drawn = coarse + (fine - coarse) * rng.random(count)
+        return 0.5 / np.sqrt(drawn) if dimensions == 2 else np.asarray(0.5 * drawn ** (-1.0 / dimensions))
 
 
 class SizeClass(Table):
@@ -174,8 +179,11 @@ class Radius(Table):
         assert self.grading is not None
         return self.grading.sieve[0] / 2.0, self.grading.sieve[-1] / 2.0
 
-    def draw(self, rng: np.random.Generator, count: int) -> Floats:
-        """Radii [m], shape (count,). For a list `count` must be its length, and nothing is drawn; classes are shuffled."""
+    def draw(self, rng: np.random.Generator, count: int, dimensions: int = 2) -> Floats:
+        """Radii [m], shape (count,). For a list `count` must be its length, and nothing is drawn; classes are shuffled.
+
+        dimensions: of the grains, which a grading curve needs to know.
+        """
         if self.fixed is not None:
             return np.full(count, self.fixed)
         if self.uniform is not None:
@@ -184,6 +192,7 @@ class Radius(Table):
             return np.array(self.sizes)
         if self.classes is not None:
             return rng.permutation(np.repeat([one.radius for one in self.classes], [one.count for one in self.classes]))
-        spread = self.normal or self.grading
-        assert spread is not None
-        return spread.draw(rng, count)
+        if self.normal is not None:
+            return self.normal.draw(rng, count)
+        assert self.grading is not None
+        return self.grading.draw(rng, count, dimensions)

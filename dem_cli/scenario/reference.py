@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from pydantic.fields import FieldInfo
@@ -16,6 +16,8 @@ from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.quantities import FrictionNumber, Number, Quantity, Range, Whole
 from dem_cli.scenario.table import Table, toml_text
 
+# Tables that stand before the stages in the part of their engine.
+BEFORE = ("[[grains]]", "[contact]", "[container]", "[[plane]]", "[terrain]", "[packing]")
 HEAD = "| key | value | default | meaning |\n|---|---|---|---|\n"
 
 
@@ -58,28 +60,38 @@ def _tidy(node: Any) -> Any:
 
 def reference_markdown() -> str:
     """The reference of scenario files: a Markdown table of keys for each table of the TOML, those that engines share once."""
-    shared = set.intersection(*(set(_tables(scenario)) for scenario in ENGINES.values()))
+    of_engine = {engine: set(_tables(scenario)) for engine, scenario in ENGINES.items()}
+    shared = {one for one in _tables(Scenario) if sum(one in tables for tables in of_engine.values()) > 1}
     sections = [_section("Top level", Scenario, top=True)]
-    sections += [_section(f"`[{name}]`", table) for name, table in _tables(Scenario) if (name, table) in shared]
+    for name, table in _tables(Scenario):
+        if (name, table) in shared:
+            without = [engine for engine, tables in of_engine.items() if (name, table) not in tables]
+            sections.append(_section(f"`{name}`", table, without=without))
     for engine, scenario in ENGINES.items():
         sections.append(f'### Only with `engine = "{engine}"`\n')
         own = [(name, table) for name, table in _tables(scenario) if (name, table) not in shared]
-        before = [(name, table) for name, table in own if name in ("contact", "container")]
-        sections += [_section(f"`[{name}]`", table, level=4) for name, table in before]
+        before = [(name, table) for name, table in own if name in BEFORE]
+        sections += [_section(f"`{name}`", table, level=4) for name, table in before]
         for kind, stage in scenario.stage_kinds.items():
             sections.append(_section(f'`[[stage]]` with `kind = "{kind}"`', stage, level=4))
-        sections += [_section(f"`[{name}]`", table, level=4) for name, table in own if (name, table) not in before]
+        sections += [_section(f"`{name}`", table, level=4) for name, table in own if (name, table) not in before]
     return "\n".join(sections)
 
 
 def _tables(scenario: type[AnyScenario]) -> list[tuple[str, type[Table]]]:
-    """The tables of a scenario but its stages, by name."""
-    fields = ((name, _table(field)) for name, field in scenario.model_fields.items() if name != "stages")
-    return [(name, table) for name, table in fields if table is not None]
+    """The tables of a scenario but its stages, by their heads: [name], or [[name]] where there may be several."""
+    fields = scenario.model_fields.items()
+    found = (
+        (field.alias or name, _table(field), _depth(field.annotation)) for name, field in fields if name != "stages"
+    )
+    return [(f"[[{name}]]" if several else f"[{name}]", table) for name, table, several in found if table is not None]
 
 
-def _section(title: str, table: type[Table], *, top: bool = False, level: int = 3) -> str:
-    about = "" if top else f"{' '.join((table.__doc__ or '').split())}\n\n"
+def _section(title: str, table: type[Table], *, top: bool = False, level: int = 3, without: Sequence[str] = ()) -> str:
+    """without: engines that do not have the table, or have another one of its name."""
+    words = " or ".join(f'`engine = "{engine}"`' for engine in without)
+    others = f" Not with {words}." if without else ""
+    about = "" if top else f"{' '.join((table.__doc__ or '').split())}{others}\n\n"
     rows = "".join(f"| `{k}` | {_words_of_engine(k, v, top)} | {d} | {m} |\n" for k, v, d, m in _rows(table, "", top))
     return f"{'#' * level} {title}\n\n{about}{HEAD}{rows}"
 

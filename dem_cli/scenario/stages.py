@@ -93,6 +93,8 @@ class Shake(Table):
     # The motion of the record, once `read_record` has been called: paths start in the scenario's folder.
     _motion: GroundMotion | None = PrivateAttr(default=None)
 
+    elsewhere: ClassVar = {"heading": ("impulse", "Leave it out: grains lie in a plane, angle says how it is shaken")}
+
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
         raw, good = given

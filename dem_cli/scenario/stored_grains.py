@@ -66,7 +66,7 @@ def read_stored_grains(path: Path, stage: str | None = None) -> StoredGrains:
             if frames == 0:
                 raise ScenarioError(f"{path}: holds no frame yet. Wait for its run, or take another file")
             n = int(file.attrs["elements" if "elements" in file.attrs else "grains"])
-            start = int(root["Steps/PointOffsets"][_frame_of(path, file, stage, frames)])
+            start = int(root["Steps/PointOffsets"][frame_of(path, file, stage, frames)])
             rows = slice(start, start + n)
             resolved = tomllib.loads(str(file.attrs["resolved"]))
             radius = data["radius"][:n]
@@ -118,7 +118,7 @@ def _box(walls: dict[str, float], x: Floats, y: Floats, r: Floats) -> dict[str, 
     return {name: walls.get(name, float(edge)) for name, edge in edges.items()}
 
 
-def _frame_of(path: Path, file: Any, stage: str | None, frames: int) -> int:
+def frame_of(path: Path, file: Any, stage: str | None, frames: int) -> int:
     """Number of the frame at the end of a stage; the last one of all without."""
     if stage is None:
         return frames - 1

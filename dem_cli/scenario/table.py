@@ -138,9 +138,9 @@ class Table(BaseModel):
             found = [said for one in error.errors(include_url=False) if (said := _in_our_words(cls, one))]
             good = _good_values(cls, raw)
         for loc, rule, remedy in (*_alternatives(cls, raw), *cls.rules(Given(raw, good))):
-            if rule == "is missing" and _at(raw, loc) is not NOTHING:
+            if rule == "is missing" and value_at(raw, loc) is not NOTHING:
                 continue  # it is there but wrong, which is said already
-            found.append(InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=_at(raw, loc)))
+            found.append(InitErrorDetails(type=mistake(rule, remedy), loc=loc, input=value_at(raw, loc)))
         found = _without_echoes(found)
         if not isinstance(written, dict):  # a short form: what is wrong with it is said once, where it stands
             found = list({_said(one)[:2]: InitErrorDetails(type=one["type"], input=written) for one in found}.values())
@@ -179,7 +179,8 @@ class _Nothing:
 NOTHING = _Nothing()
 
 
-def _at(raw: Any, loc: tuple[str | int, ...]) -> Any:
+def value_at(raw: Any, loc: tuple[str | int, ...]) -> Any:
+    """What TOML data hold at a place; NOTHING if there is no such."""
     for part in loc:
         try:
             raw = raw[part]
@@ -231,7 +232,7 @@ def _valid(adapter: TypeAdapter[Any], value: Any) -> Any:
         wrong = [one["loc"] for one in error.errors(include_url=False, include_input=False)]
     pruned = copy.deepcopy(value)
     for loc in wrong:
-        table = _at(pruned, loc[:-1])
+        table = value_at(pruned, loc[:-1])
         if loc and isinstance(table, dict):
             table.pop(str(loc[-1]), None)
     return adapter.validate_python(pruned)
@@ -247,12 +248,17 @@ def _in_our_words(cls: type[Table], error: Any) -> InitErrorDetails | None:
     rule, remedy = "is not valid", str(error["msg"])
     if kind == "tuple_type" and loc[-1:] == ("stage",):
         rule, remedy = "must be a list of tables", "Head each stage with [[stage]], in double brackets"
+    elif kind == "tuple_type" and loc[-1:] in (("grains",), ("plane",)):
+        rule, remedy = (
+            "must be a table, or a list of tables",
+            f"Head it with [{loc[-1]}], or each one with [[{loc[-1]}]]",
+        )
     elif kind in _PLAIN:
         rule, remedy = _PLAIN[kind]
     elif kind == "extra_forbidden":
         rule, remedy = cls.other_engine(str(loc[-1])) or ("unknown key", did_you_mean(str(loc[-1]), keys_of(cls)))
     elif kind == "missing" and isinstance(loc[-1], int):
-        rule, remedy, value = "is missing", "Give both values", NOTHING
+        rule, remedy, value = "is missing", "Give both values" if loc[-1] < 2 else "Give all values", NOTHING
     elif kind == "missing":
         rule, remedy, value = "is missing", _example_of(cls, str(loc[-1])), NOTHING
     elif kind == "literal_error" and (other := cls.other_engine(f"{loc[-1]}={value}")):

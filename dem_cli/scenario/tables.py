@@ -43,6 +43,28 @@ SHAPES_OF = {
     "equal_area": TEMPLATED,
     "bond": ("bonded",),
 }
+IMPULSE = "impulse"
+# Keys and shapes of the bodies of the impulse engine.
+OF_BODIES = {
+    **dict.fromkeys(
+        (
+            "name",
+            "size",
+            "face_points",
+            "file",
+            "file_unit",
+            "spacing",
+            "scale",
+            "material",
+            "position",
+            "step",
+            "velocity",
+            "spin",
+        ),
+        (IMPULSE, f'Leave it out, or write engine = "{IMPULSE}"'),
+    ),
+    **{f"shape={name}": (IMPULSE, f'Write engine = "{IMPULSE}"') for name in ("box", "sphere", "cloud", "mesh")},
+}
 
 
 class Grains(Table):
@@ -86,6 +108,8 @@ class Grains(Table):
         doc="bonded: what holds the discs of a grain together",
         example={"normal": "stiff", "tangential": "stiff", "rolling": True},
     )
+
+    elsewhere: ClassVar = OF_BODIES
 
     @classmethod
     def rules(cls, given: Given) -> Iterator[Mistake]:
@@ -220,7 +244,10 @@ class Contact(Table):
     )
 
     alternatives: ClassVar = ((("damping_ratio",), ("restitution",)),)
-    elsewhere: ClassVar = {"cohesion": ("granular-element", 'Leave it out, or write engine = "granular-element"')}
+    elsewhere: ClassVar = {
+        "cohesion": ("granular-element", 'Leave it out, or write engine = "granular-element"'),
+        "pairs": (IMPULSE, "Leave it out; wall_friction says what differs at walls"),
+    }
 
     @classmethod
     def spell_out(cls, raw: Any) -> Any:
@@ -258,6 +285,10 @@ class Container(Table):
     gravity: Acceleration = key("9.80665 m/s^2", "gravity", example="980 gal")
     gravity_direction: Angle = key("-90 deg", "direction of gravity, anticlockwise from +x", example="-90 deg")
 
+    elsewhere: ClassVar = {
+        "breadth": (IMPULSE, "Leave it out: grains lie in a plane, depth says how long they are"),
+        "material": (IMPULSE, "Leave it out; contact.wall_friction says what differs at walls"),
+    }
     more_schema: ClassVar[JsonSchema] = {"required": []}  # the scenario says when width is needed
 
     @classmethod
@@ -342,3 +373,5 @@ class Output(Table):
         40, "columns across the width in which the free surface is measured", example=40
     )
     window: Window = key({}, "inner window for void ratio and stress", example={"side": 0.1, "bottom": 0.1, "top": 0.2})
+
+    elsewhere: ClassVar = {"check": (IMPULSE, "Leave it out")}
