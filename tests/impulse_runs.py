@@ -103,13 +103,18 @@ def none() -> BodyContacts:
 
 
 def bounced(height: float, e: float, dt: float, duration: float) -> list[tuple[float, float, float]]:
-    """Time, height over the floor and velocity of a bouncing point, in the engine's split step: half drift, impact, kick, half drift."""
+    """Time, height over the floor and velocity of a bouncing point in the engine's split step, half drift, impact, kick, half drift.
+
+    The flight behind an impact passes the floor with e times the speed of the flight before it, however deep the step lets the point in.
+    """
     z, v, found = height, 0.0, [(0.0, height, 0.0)]
     for k in range(1, round(duration / dt) + 1):
+        passed = v * v + 2.0 * G * z  # square of the speed at the floor
         z += 0.5 * dt * v
         if z <= 0.0 and v < 0.0:
-            v = -e * v
-        v -= G * dt
+            v = -0.5 * G * dt + np.sqrt((0.5 * G * dt) ** 2 + e**2 * passed - 2.0 * G * z)
+        else:
+            v -= G * dt
         z += 0.5 * dt * v
         found.append((k * dt, z, v))
     return found

@@ -64,12 +64,12 @@ def test_central_impact_keeps_momentum_and_gives_back_e() -> None:
 
 @pytest.mark.parametrize("every", [1, 7])
 def test_drop(tmp_path: Path, every: int) -> None:
-    """Whatever the interval of the tracks, the restitution comes out exactly, and times as the split step has them."""
+    """Whatever the interval of the tracks, speeds come out exactly, and times as the split step has them."""
     (check,) = summary_of(made.drop_file(tmp_path / "a.h5", every=every)).checks
-    rows = check.rows[:3]
-    u = np.sqrt(2.0 * made.G * 0.6)
+    rows, u = check.rows[:3], np.sqrt(2.0 * made.G * 0.6)
     assert [row["bounce"] for row in rows] == [1.0, 2.0, 3.0]
     assert [row["ratio"] for row in rows] == pytest.approx([0.5] * 3, abs=1e-9)
+    assert [row["rebound"] for row in rows] == pytest.approx([0.5 * u, 0.25 * u, 0.125 * u], abs=1e-9)
     assert [row["rebound_closed"] for row in rows] == pytest.approx([0.5 * u, 0.25 * u, 0.125 * u])
     first = np.sqrt(2.0 * 0.6 / made.G)
     assert [row["time_closed"] for row in rows] == pytest.approx([first, 2.0 * first, 2.5 * first])

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from dem_cli.report.impulse_histories import History, depth_along, histories
+from dem_cli.report.impulse_histories import depth_along, histories
 from dem_cli.results import BodyResults
 from dem_cli.state import Floats
 
@@ -109,27 +109,34 @@ def drop_setting(results: BodyResults, body: int) -> tuple[Bounces, Floats, int]
     return Bounces(gap, float(start.v[body] @ normal), float(-results.gravity @ normal), e), normal, plane
 
 
-def bounces_of(history: History, normal: Floats, gravity: float, dt: float) -> list[tuple[float, float, float, float]]:
-    """Time [s], speed before and after [m/s], spin after [rad/s] of each bounce in a history; gravity [m/s^2] against the normal.
+@dataclass(frozen=True)
+class Bounce:
+    """time [s] at which the velocity jumps; impact, rebound [m/s]: speeds at which the flights before and behind it pass the plane; spin [rad/s]
+    behind it."""
 
-    Between two instants with a bounce the body flies freely before and behind it, which tells its time exactly. An impact acts
-    in the middle of a step on the velocity that the step began with: speeds are those just before and behind it, without that step's gravity.
+    time: float
+    impact: float
+    rebound: float
+    spin: float
+
+
+def bounces_of(time: Floats, gap: Floats, velocity: Floats, spin: Floats, gravity: float) -> list[Bounce]:
+    """Bounces of a body from its gap [m] over the plane, its velocity [m/s] along the normal and its spin [rad/s] at instants (t,).
+
+    Between two instants with one bounce the body flies freely, under gravity [m/s^2] against the normal, before and behind it: where the two
+    flights meet is its time, and what each has at the level of the plane is its speed, whatever the interval of the instants and however deep
+    a step lets the body in.
     """
-    t, z, v = history.time, history.x @ normal, history.v @ normal
-    found: list[tuple[float, float, float, float]] = []
-    for k in range(len(t) - 1):
-        span = float(t[k + 1] - t[k])
-        jump = float(v[k + 1] - v[k] + gravity * span)
-        if v[k] >= 0.0 or jump <= 1e-3 * abs(float(v[k])) or v[k + 1] <= 0.0:
+    found: list[Bounce] = []
+    for k in range(len(time) - 1):
+        span = float(time[k + 1] - time[k])
+        jump = float(velocity[k + 1] - velocity[k] + gravity * span)
+        if velocity[k] >= 0.0 or velocity[k + 1] <= 0.0 or jump <= 1e-3 * abs(float(velocity[k])):
             continue
-        after = (z[k + 1] - z[k] - v[k + 1] * span - 0.5 * gravity * span**2) / -jump
-        step = max(0.0, round(float(after) / dt - 0.5)) * dt  # start of the step of the impact
-        if step > span:
-            continue
-        before, behind = -float(v[k]) + gravity * step, float(v[k + 1]) + gravity * (span - step)
-        found.append(
-            (float(t[k]) + step + 0.5 * min(dt, span), before, behind, float(np.linalg.norm(history.w[k + 1])))
-        )
+        after = (gap[k + 1] - gap[k] - velocity[k + 1] * span - 0.5 * gravity * span**2) / -jump
+        impact, rebound = (math.sqrt(max(0.0, float(velocity[n] ** 2 + 2.0 * gravity * gap[n]))) for n in (k, k + 1))
+        if 0.0 <= after <= span and impact > 0.0:
+            found.append(Bounce(float(time[k] + after), impact, rebound, float(spin[k + 1])))
     return found
 
 
@@ -154,29 +161,29 @@ def drop_check(results: BodyResults) -> tuple[Check, ...]:
     dt = time_step(results)
     if history is None or not closed.gravity > 0.0 or math.isnan(dt):
         return (Check("drop", title, columns, (), ("the file holds too little of body 0",)),)
+    along = history.x @ normal
+    gap, spin = along - along[0] + closed.gap, np.linalg.norm(history.w, axis=1)
     rows = []
-    for k, (time, impact, rebound, spin) in enumerate(
-        bounces_of(history, normal, closed.gravity, dt)[:MOST_BOUNCES], 1
-    ):
+    for k, one in enumerate(bounces_of(history.time, gap, history.v @ normal, spin, closed.gravity)[:MOST_BOUNCES], 1):
         want_time, want = closed.time(k), closed.rebound(k)
         rows.append(
             {
                 "bounce": float(k),
-                "time": time,
+                "time": one.time,
                 "time_closed": want_time,
-                "time_error": (time - float(history.time[0]) - want_time) / dt,
-                "impact": impact,
-                "rebound": rebound,
+                "time_error": (one.time - float(history.time[0]) - want_time) / dt,
+                "impact": one.impact,
+                "rebound": one.rebound,
                 "rebound_closed": want,
-                "rebound_error": rebound / want - 1.0 if want > 0.0 else math.nan,
-                "ratio": rebound / impact,
-                "spin": spin,
+                "rebound_error": one.rebound / want - 1.0 if want > 0.0 else math.nan,
+                "ratio": one.rebound / one.impact,
+                "spin": one.spin,
             }
         )
     e = f"{closed.restitution:g}"
     notes = (
         f"body 0 falls {closed.gap:.6g} m on {results.planes.name[plane]}, restitution {e}: rebound k is {e}^k sqrt(2 g h)",
-        f"a step is {dt:.4g} s, in which gravity changes the speed by {closed.gravity * dt:.2g} m/s",
+        f"speeds are those at which the free flights before and behind a bounce pass the plane; a step is {dt:.4g} s",
     )
     return (Check("drop", title, columns, tuple(rows), notes if rows else (*notes, "no bounce was seen")),)
 

@@ -18,6 +18,7 @@ LABELS = {
     "friction": "friction",
     "escaped_energy": "escaped bodies",
 }
+ROUNDING = 1e-12  # share of the largest number beside it below which one is shown as 0
 # Column of a check -> how its numbers are shown.
 FORMS = {
     "bounce": ".0f", "body": ".0f", "time": ".6g", "time_closed": ".6g", "time_error": "+.2f", "impact": ".6f", "rebound": ".6f",
@@ -141,24 +142,33 @@ def _stage(stage: BodyStage) -> Block:
     span = f"{stage.start:.5g} s to {stage.end:.5g} s" if ended else f"from {stage.start:.5g} s, not ended"
     title = f"Stage {stage.number}: {stage.kind}{own}, {span}" + (f"; {stage.reason}" if stage.reason else "")
 
-    def pair(label: str, name: str, form: str, unit: str = "") -> tuple[str, str]:
-        before, after = stage.before[name], stage.after[name]
+    def pair(label: str, name: str, form: str, unit: str = "", least: float = 0.0) -> tuple[str, str]:
+        """least: what is less is rounding and shown as 0."""
+        before, after = (0.0 if abs(state[name]) < least else state[name] for state in (stage.before, stage.after))
         largest = max((abs(v) for v in (before, after) if math.isfinite(v)), default=0.0)
         scale, shown = display_unit(unit, largest) if unit else (1.0, "")
         return f"{label} [{shown}]" if shown else label, arrow(before / scale, after / scale, form)
 
+    energy, place = (
+        ROUNDING
+        * max(
+            (abs(state[name]) for state in (stage.before, stage.after) for name in names if math.isfinite(state[name])),
+            default=0.0,
+        )
+        for names in (("kinetic", "rotational", "potential"), ("center_x", "center_y", "center_z", "top"))
+    )
     rows = [
-        pair("kinetic energy", "kinetic", ".4g", "J"),
-        pair("rotational energy", "rotational", ".4g", "J"),
-        pair("potential energy", "potential", ".5g", "J"),
-        pair("centre of mass x", "center_x", ".4g", "m"),
-        pair("centre of mass y", "center_y", ".4g", "m"),
-        pair("centre of mass z", "center_z", ".4g", "m"),
+        pair("kinetic energy", "kinetic", ".4g", "J", energy),
+        pair("rotational energy", "rotational", ".4g", "J", energy),
+        pair("potential energy", "potential", ".5g", "J", energy),
+        pair("centre of mass x", "center_x", ".4g", "m", place),
+        pair("centre of mass y", "center_y", ".4g", "m", place),
+        pair("centre of mass z", "center_z", ".4g", "m", place),
         pair("highest point", "top", ".4g", "m"),
         pair("contact points", "contacts", ".0f"),
         pair("touching pairs", "touching", ".0f"),
         pair("touching neighbours of a body", "coordination", ".2f"),
-        pair("largest penetration", "penetration", ".2g", "m"),
+        pair("largest penetration", "penetration", ".2g", "m", place),
         pair("moving bodies (over 1 mm/s)", "moving", ".0f"),
         pair("escaped bodies", "escaped", ".0f"),
     ]
@@ -196,10 +206,11 @@ def _solver(solver: Solver) -> Block:
 
 
 def _energy(e: BodyEnergy) -> Block:
-    scale, unit = display_unit("J", max(abs(e.stored_start), abs(e.energy_in), abs(e.stored_total)))
+    largest = max(abs(e.stored_start), abs(e.energy_in), abs(e.stored_total))
+    scale, unit = display_unit("J", largest)
 
     def row(label: str, value: float) -> tuple[str, str]:
-        return label, number(value / scale, ".5g")
+        return label, number(0.0 if abs(value) < ROUNDING * largest else value / scale, ".5g")
 
     rows = [
         row("stored at the start", e.stored_start),
@@ -209,7 +220,7 @@ def _energy(e: BodyEnergy) -> Block:
         *(row(f"  {LABELS[name]}", value) for name, value in e.stored.items()),
         row("lost", e.lost_total),
         *(row(f"  {LABELS[name]}", value) for name, value in e.lost.items()),
-        row("residual", e.residual),
+        ("residual", number(e.residual / scale, ".2g")),
         row("energy put in", e.energy_in),
         ("residual over energy put in", number(e.residual_ratio, ".1e")),
         ("  largest of the run", number(e.residual_largest_ratio, ".1e")),
