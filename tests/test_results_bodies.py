@@ -29,6 +29,7 @@ from dem_cli.errors import ResultsError
 from dem_cli.results import BodyResults, Results, open_results, partial_path
 from dem_cli.results.body_schema import BODY_CELL_DATA, BODY_POINT_DATA, BODY_SERIES, BODY_TRACKS
 from dem_cli.rigid import Bodies
+from dem_cli.scenario.stored_bodies import read_stored_bodies
 
 
 @pytest.fixture
@@ -266,3 +267,17 @@ def test_xarray_opens_series_and_tracks(done: Path) -> None:
         assert data.q0.dims == ("time", "grain")
     with xarray.open_dataset(done, group="materials", engine="h5netcdf") as data:
         assert data.friction.values.tolist() == [[0.3, 0.6], [0.6, 0.1]]
+
+
+def test_a_packing_takes_the_bodies_as_the_reader_has_them(done: Path) -> None:
+    """Scenarios read result files by themselves; they know the layout as the reader does."""
+    stored = read_stored_bodies(done)
+    with opened(done) as results:
+        bodies, shapes = results.frame(-1).bodies, results.scene_shapes
+        present = bodies.take(~bodies.escaped)
+    assert len(stored) == len(present) == N - 1
+    for name in ("group", "shape", "scale", "x", "q", "v", "w", "mass", "inertia"):
+        assert np.array_equal(stored.columns[name], getattr(present, name)), name
+    for one, two in zip(stored.shapes, shapes, strict=True):
+        for name, value in one.items():
+            assert np.array_equal(value, getattr(two, name)), name
