@@ -22,7 +22,8 @@ from dem_cli.report.camera import Camera, Paint, faces
 from dem_cli.report.figures import Picture, draw
 from dem_cli.report.impulse_figures import ALL_KINDS
 from dem_cli.report.look import style
-from dem_cli.report.scene3d import grid_lines, grid_step, view_of
+from dem_cli.report.pieces import cut_lines, grid_lines, grid_step, piece
+from dem_cli.report.scene3d import view_of
 from dem_cli.report.solids import icosphere, sharp_edges, solid_of, subdivided
 from dem_cli.results import BodyResults, open_results
 from dem_cli.rigid import Terrain
@@ -151,6 +152,19 @@ def test_grid() -> None:
     edge = np.array([[0.5, 0, 0], [2.5, 0, 0], [2.5, 1, 0], [0.5, 1, 0]])
     lines = grid_lines(edge, np.array([0.0, 0, 1]), 1.0)
     assert np.unique(lines[lines[:, 0, 0] == lines[:, 1, 0]][:, 0, 0]).tolist() == [1.0, 2.0]
+
+
+def test_planes_are_cut_where_they_meet() -> None:
+    """A floor and an upright wall through its middle: half of each is left."""
+    planes = planes_of(("floor", [0, 0, 0], [0, 0, 1]), ("wall", [0, 0, 0], [1, 0, 0]))
+    assert piece(planes, 0)[:, 0].min() == pytest.approx(0.0)
+    assert piece(planes, 0)[:, 0].max() == pytest.approx(1.0)
+    assert piece(planes, 1)[:, 2].min() == pytest.approx(0.0)
+    lines = cut_lines(grid_lines(planes.edge[0], planes.normal[0], 0.5), planes, 0)
+    assert (lines[..., 0].min(), lines[..., 0].max()) == (pytest.approx(0.0), pytest.approx(1.0))
+    assert len(lines) == 5 + 3  # across, and those along at 0, 0.5 and 1
+    apart = planes_of(("floor", [0, 0, 0], [0, 0, 1]), ("over it", [0, 0, 5], [0, 0, 1]))
+    assert len(piece(apart, 0)) == 4  # nothing would be left
 
 
 # ------------------------------------------------------------------------------------------------ the scene

@@ -92,7 +92,7 @@ def draw_trajectories(
     right.set_title("section")
     if len(found.ids) <= len(COLORS):
         left.legend(fontsize=8)
-    heading(figure, results, f"Trajectories of {len(found.ids)} bodies, {text}")
+    heading(figure, results, f"Trajectories of {len(found.ids)} {'body' if len(found.ids) == 1 else 'bodies'}, {text}")
     return figure
 
 

@@ -12,6 +12,7 @@ from dem_cli.analysis.placed import by_shape, extent
 from dem_cli.report.body_quantities import BODY_QUANTITIES, BodyQuantity
 from dem_cli.report.camera import DEFAULT_VIEW, Camera, Paint, faces, strokes
 from dem_cli.report.look import axis_label, display_unit, heading, largest, new_figure, place_text, stage_label
+from dem_cli.report.pieces import draw_planes
 from dem_cli.report.sample import PALETTE, first_frame_of_stage, value_colors
 from dem_cli.report.solids import solid_of, subdivided
 from dem_cli.report.strokes import draw_lines
@@ -31,7 +32,6 @@ FINE = (
     (3, 40_000),
     (2, 250_000),
 )  # subdivisions of spheres, and the triangles of all bodies together that they may make
-LINES = 12  # of a grid along the longer side of a plane, at most
 CHAIN = "#B2182B"
 
 
@@ -71,7 +71,7 @@ def draw_scene(
     ax.set_xlim(low, high)
     ax.set_ylim(bottom, top)
     ax.set_axis_off()
-    grid = _draw_planes(ax, results, view)
+    grid = draw_planes(ax, results.planes, view.camera)
     colors = _body_colors(figure, ax, results, quantity, values, scale, unit, shown, limits)
     painted = _paint_bodies(frame.bodies, results.scene_shapes, view.camera, shown, colors)
     if results.terrain is not None:
@@ -245,57 +245,6 @@ def _show(ax: Axes, paint: Paint, alpha: float) -> None:
 
 
 # ------------------------------------------------------------------------------------------------ what does not move
-
-
-def _draw_planes(ax: Axes, results: BodyResults, view: View) -> str:
-    """Planes that show their bodies' side as a pale piece with a grid, the others as an outline over all. Returns the grid's caption."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    planes, camera = results.planes, view.camera
-    if len(planes) == 0:
-        return ""
-    longest = max(float(np.linalg.norm(edge[1] - edge[0])) for edge in planes.edge)
-    longest = max(longest, *(float(np.linalg.norm(edge[2] - edge[1])) for edge in planes.edge))
-    step = grid_step(longest)
-    faced = planes.normal @ camera.toward > 0.0
-    order = np.argsort(camera.depth(planes.edge.mean(axis=1)))
-    for w in order.tolist():
-        corners = camera.screen(planes.edge[w])
-        if faced[w]:
-            tint = camera.shade(planes.normal[w])
-            pale = np.clip(np.array([0.935, 0.945, 0.955]) * (0.85 + 0.15 * tint), 0.0, 1.0)
-            ax.add_collection(PolyCollection([corners], facecolors=[pale], edgecolors="0.55", linewidths=0.6, zorder=0))
-            lines = camera.screen(grid_lines(planes.edge[w], planes.normal[w], step))
-            ax.add_collection(LineCollection(list(lines), colors="0.80", linewidths=0.4, zorder=1))
-        else:
-            outline = np.concatenate([corners, corners[:1]])
-            ax.plot(outline[:, 0], outline[:, 1], color="0.45", lw=0.6, zorder=3)
-    scale, unit = display_unit("m", step)
-    return f"grid {step / scale:g} {unit}" if faced.any() else ""
-
-
-def grid_step(length: float) -> float:
-    """1, 2 or 5 times a power of ten [m], at most LINES of them in a length."""
-    least = length / LINES
-    power = 10.0 ** math.floor(math.log10(least)) if least > 0.0 else 1.0
-    return next(k * power for k in (1.0, 2.0, 5.0, 10.0) if k * power >= least * (1.0 - 1e-9))
-
-
-def grid_lines(edge: Floats, normal: Floats, step: float) -> Floats:
-    """Lines (g, 2, 3) [m] of a grid on the piece `edge` (4, 3) of a plane, through the multiples of `step` along its sides from the origin."""
-    found = []
-    for a, b, c, d in ((0, 1, 2, 3), (1, 2, 3, 0)):
-        along = edge[b] - edge[a]
-        length = float(np.linalg.norm(along))
-        if length == 0.0:
-            continue
-        along = along / length
-        start = float(edge[a] @ along)
-        marks = step * np.arange(math.ceil(start / step - 1e-9), math.floor((start + length) / step + 1e-9) + 1) - start
-        low, high = edge[a] + marks[:, None] * along, edge[d] + marks[:, None] * along
-        assert abs(float((edge[c] - edge[d]) @ normal)) < 1e-6 * max(1.0, length)
-        found.append(np.stack([low, high], axis=1))
-    return np.concatenate(found) if found else np.empty((0, 2, 3))
 
 
 def _draw_axes(ax: Axes, view: View) -> None:
