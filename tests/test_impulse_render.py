@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from PIL import Image
-from scene_samples import axis_angle, bodies_at, box_shape, pair_shape, planes_of, scene_of
+from scene_samples import axis_angle, bodies_at, box_shape, container, pair_shape, planes_of, scene_of
 
 from dem_cli.cli import main
 from dem_cli.errors import ScenarioError
@@ -22,7 +22,7 @@ from dem_cli.report.camera import Camera, Paint, faces
 from dem_cli.report.figures import Picture, draw
 from dem_cli.report.impulse_figures import ALL_KINDS
 from dem_cli.report.look import style
-from dem_cli.report.pieces import cut_lines, grid_lines, grid_step, piece
+from dem_cli.report.pieces import cut_lines, grid_lines, grid_step, lowered, piece
 from dem_cli.report.scene3d import view_of
 from dem_cli.report.solids import icosphere, sharp_edges, solid_of, subdivided
 from dem_cli.results import BodyResults, open_results
@@ -165,6 +165,14 @@ def test_planes_are_cut_where_they_meet() -> None:
     assert len(lines) == 5 + 3  # across, and those along at 0, 0.5 and 1
     apart = planes_of(("floor", [0, 0, 0], [0, 0, 1]), ("over it", [0, 0, 5], [0, 0, 1]))
     assert len(piece(apart, 0)) == 4  # nothing would be left
+
+
+def test_walls_end_a_little_over_the_bodies() -> None:
+    planes = container(4.0, 3.0, height=50.0)
+    low = lowered(planes, 2.0)
+    assert low.edge[:4, :, 2].max() == 2.0
+    assert np.array_equal(low.edge[4], planes.edge[4])
+    assert np.array_equal(lowered(planes, -1.0).edge, planes.edge)  # walls that begin above stay
 
 
 # ------------------------------------------------------------------------------------------------ the scene

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +42,16 @@ def draw_planes(ax: Axes, planes: Planes, camera: Camera) -> str:
             ax.plot(outline[:, 0], outline[:, 1], color="0.45", lw=0.6, zorder=3)
     scale, unit = display_unit("m", step)
     return f"grid {step / scale:g} {unit}" if faced.any() else ""
+
+
+def lowered(planes: Planes, ceiling: float) -> Planes:
+    """Planes whose upright pieces end at z = `ceiling` [m]: walls may be much higher than what is between them."""
+    edge = planes.edge.copy()
+    upright = np.abs(planes.normal[:, 2]) < 0.1
+    low = edge[..., 2].min(axis=1, initial=np.inf)
+    for w in np.flatnonzero(upright & (low < ceiling)).tolist():
+        edge[w, :, 2] = np.minimum(edge[w, :, 2], ceiling)
+    return replace(planes, edge=edge)
 
 
 def piece(planes: Planes, w: int) -> Floats:

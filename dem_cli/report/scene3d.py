@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from dem_cli.analysis.placed import by_shape, extent
 from dem_cli.report.body_quantities import BODY_QUANTITIES, BodyQuantity
 from dem_cli.report.camera import DEFAULT_VIEW, Camera, Paint, faces, strokes
 from dem_cli.report.look import axis_label, display_unit, heading, largest, new_figure, place_text, stage_label
-from dem_cli.report.pieces import draw_planes
+from dem_cli.report.pieces import draw_planes, lowered
 from dem_cli.report.sample import PALETTE, first_frame_of_stage, value_colors
 from dem_cli.report.solids import solid_of, subdivided
 from dem_cli.report.strokes import draw_lines
@@ -37,10 +38,11 @@ CHAIN = "#B2182B"
 
 @dataclass(frozen=True)
 class View:
-    """Camera, and the window on its screen: left, right, bottom, top [m]."""
+    """Camera, the window on its screen: left, right, bottom, top [m], and the height [m] at which walls end."""
 
     camera: Camera
     window: tuple[float, float, float, float]
+    ceiling: float = math.inf
 
 
 def draw_scene(
@@ -71,7 +73,7 @@ def draw_scene(
     ax.set_xlim(low, high)
     ax.set_ylim(bottom, top)
     ax.set_axis_off()
-    grid = draw_planes(ax, results.planes, view.camera)
+    grid = draw_planes(ax, lowered(results.planes, view.ceiling), view.camera)
     colors = _body_colors(figure, ax, results, quantity, values, scale, unit, shown, limits)
     painted = _paint_bodies(frame.bodies, results.scene_shapes, view.camera, shown, colors)
     if results.terrain is not None:
@@ -86,7 +88,8 @@ def draw_scene(
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
     heading(figure, results, text)
     if any(notes):
-        figure.supxlabel("; ".join(note for note in notes if note), fontsize=8)
+        caption = textwrap.fill("; ".join(note for note in notes if note), int(14.0 * figure.get_figwidth()))
+        figure.supxlabel(caption, fontsize=8)
     return figure
 
 
@@ -115,20 +118,23 @@ def values_of(
 def view_of(results: BodyResults, frames: list[int], angles: tuple[float, float] | None = None) -> View:
     """A view that holds the bodies of some frames, the planes' pieces and the terrain. angles: azimuth and elevation [deg]."""
     camera = Camera.at(*(DEFAULT_VIEW if angles is None else angles))
-    corners = [results.planes.edge.reshape(-1, 3)]
-    if results.terrain is not None:
-        corners.append(results.terrain.vertices)
+    corners = [] if results.terrain is None else [results.terrain.vertices]
+    top = -math.inf
     for k in frames:
         bodies = results.frame(k).bodies
         present = bodies.take(~bodies.escaped & np.isfinite(bodies.x).all(axis=1))
         if len(present):
             low, high = extent(present, results.scene_shapes)
             ends = np.stack([low, high], axis=1)
+            top = max(top, float(high[:, 2].max()))
             corners += [ends[:, [a, b, c]][:, [0, 1, 2], [0, 1, 2]] for a in (0, 1) for b in (0, 1) for c in (0, 1)]
+    bottom = float(results.planes.edge[..., 2].min(initial=top))
+    ceiling = top + 0.15 * (top - bottom) if top > bottom else math.inf
+    corners.append(lowered(results.planes, ceiling).edge.reshape(-1, 3))
     points = camera.screen(np.concatenate(corners)) if sum(map(len, corners)) else np.array([[-1.0, -1.0], [1.0, 1.0]])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.03 * float((high - low).max()) + 1e-12
-    return View(camera, (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin))
+    return View(camera, (low[0] - margin, high[0] + margin, low[1] - margin, high[1] + margin), ceiling)
 
 
 def _size(window: tuple[float, float, float, float]) -> tuple[float, float]:
