@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from dem_cli.engines.impulse.arrays import CENTER, SCALE, TURN
 from dem_cli.jit import kernel
 
