@@ -61,14 +61,12 @@ def mesh(vertices: Any, triangles: Any) -> Shape:
     return shape_of("polyhedron", vertices=np.asarray(vertices, dtype=float), triangles=np.asarray(triangles))
 
 
-def cloud_box(size: Sequence[float], many: int) -> Shape:
-    """Particles at the centres of many x many cells of each face of a box; all can be trusted but those at the edges."""
+def cloud_box(size: Sequence[float], many: int, edge: float = 0.3) -> Shape:
+    """Particles at the centres of many x many cells of each face of a box. Those up to `edge` from the middle of a face, in box sizes, are trusted."""
     points = box(size, many)
     around = np.sort(np.abs(points.points / np.asarray(size)), axis=1)[:, 1]
     spacing = max(size) / many
-    return shape_of(
-        "cloud", points=points.points, normals=points.normals, trusted=around < 0.5 - 0.6 / many, spacing=spacing
-    )
+    return shape_of("cloud", points=points.points, normals=points.normals, trusted=around < edge, spacing=spacing)
 
 
 def scene(

@@ -48,13 +48,13 @@ OPPOSED = -0.5  # cosine of the angle between normals of a face point and the fa
 UNOPPOSED = 2.0  # the same for what has no normal
 
 
-@kernel()
+@kernel(inner=True)
 def opposed_to(shapes, k):
     """Largest cosine of the angle between the normal of point k and that of what it touches."""
     return OPPOSED if shapes.point[k, TRUSTED] > 0.0 else UNOPPOSED
 
 
-@kernel()
+@kernel(inner=True)
 def _over(shapes, t, p, height, border):
     """Whether p, at `height` over the plane of triangle t, lies over the triangle, or below a valley at its side."""
     for k in range(3):
@@ -67,7 +67,7 @@ def _over(shapes, t, p, height, border):
     return True
 
 
-@kernel()
+@kernel(inner=True)
 def _face_to_face(shapes, a, b):
     """Whether triangles a and b have each other's middle in front, as the two sides of a valley do."""
     way = sub(row(shapes.triangle, b, MIDDLE), row(shapes.triangle, a, MIDDLE))
@@ -76,7 +76,7 @@ def _face_to_face(shapes, a, b):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def corner_fits(shapes, v, n):
     """Whether all edges that leave corner v point away from a face with normal n, in the corner's frame; by 10 degrees they need not."""
     least = 0.0
@@ -85,7 +85,7 @@ def corner_fits(shapes, v, n):
     return least >= -DIP
 
 
-@kernel()
+@kernel(inner=True)
 def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
     """Faces of shape s that a point p in its frame touches: near.held and near.height, the first of the number returned.
 
@@ -94,7 +94,8 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
     is from -depth to tolerance, and the body could touch it there; of those the nearest, and others only that face it across a valley.
     """
     tolerance, depth, border = limits
-    many, convex = 0, shapes.number[s, CONVEX]
+    count, convex = near.count, shapes.number[s, CONVEX]
+    count[HELD] = 0
     for m in range(near.count[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         n = row(shapes.triangle, t, FACE_NORMAL)
@@ -109,14 +110,15 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
                 continue
         elif dot(row(shapes.point, -1 - feature, NORMAL), n) > opposed:
             continue
-        near.item[HELD, many], near.height[many] = t, height
-        many += 1
-    return _nearest(shapes, near, many, tolerance)
+        near.item[HELD, count[HELD]], near.height[count[HELD]] = t, height
+        count[HELD] += 1
+    return _nearest(shapes, near, tolerance)
 
 
-@kernel()
-def _nearest(shapes, near, many, tolerance):
+@kernel(inner=True)
+def _nearest(shapes, near, tolerance):
     """Of the faces near.held those that are the nearest, or face all nearer ones, and are no higher than the tolerance."""
+    many = near.count[HELD]
     for k in range(1, many):
         m, t, height = k, near.item[HELD, k], near.height[k]
         while m > 0 and (
@@ -147,7 +149,7 @@ def _nearest(shapes, near, many, tolerance):
     return touching
 
 
-@kernel()
+@kernel(inner=True)
 def _put_faces(shapes, placed, near, many, found, pair, owner, p, kind, feature, merge):
     """Contacts of point p of body `owner[0]`, in the frame of body `owner[1]`, with the first faces of near.held; owner[2]: 1 if i's."""
     b, scale = owner[1], placed.frame[owner[1], SCALE]
@@ -160,7 +162,7 @@ def _put_faces(shapes, placed, near, many, found, pair, owner, p, kind, feature,
         put_new(found, pair, key, point, normal, height * scale, merge, SAME)
 
 
-@kernel()
+@kernel(inner=True)
 def features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge):
     """Gathered corners and points of body a against the gathered triangles of body b.
 

@@ -33,13 +33,13 @@ from dem_cli.jit import kernel
 FEW = 40  # triangles that are looked at one by one rather than by the grid
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _half(shapes, s):
     low, high = row(shapes.size, s, LOW), row(shapes.size, s, HIGH)
     return times(add(low, high), 0.5), times(sub(high, low), 0.5)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _spread(m, h):
     """Half edges of the upright box about a box with half edges h that is turned by m."""
     return (
@@ -49,7 +49,7 @@ def _spread(m, h):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def box_seen(shapes, s, relation):
     """Corners (low, high) of the upright box, in b's frame, about the box of body a with shape s; relation: `relative` of a and b."""
     middle, half = _half(shapes, s)
@@ -58,7 +58,7 @@ def box_seen(shapes, s, relation):
     return sub(center, half), add(center, half)
 
 
-@kernel()
+@kernel(inner=True)
 def boxes_apart(shapes, a, b, relation, tolerance):
     """Whether the boxes of shapes a and b are farther apart than `tolerance` in b's frame, by the separating axis theorem (15 axes)."""
     m, _, f = relation
@@ -88,7 +88,7 @@ def boxes_apart(shapes, a, b, relation, tolerance):
     return False
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _meets(low, high, a_low, a_high):
     return (
         a_low[0] <= high[0] and a_high[0] >= low[0] and a_low[1] <= high[1] and a_high[1] >= low[1]
@@ -96,14 +96,14 @@ def _meets(low, high, a_low, a_high):
     )  # fmt: skip
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def holds(low, high, p):
     return (
         low[0] <= p[0] and p[0] <= high[0] and low[1] <= p[1] and p[1] <= high[1] and low[2] <= p[2] and p[2] <= high[2]
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _cut(low, high, origin, cell, many):
     """First and last of the cells along an axis that meet an interval; there are none where the last is less than the first."""
     return int(min(max((low - origin) / cell, 0.0), float(many))), int(
@@ -111,7 +111,7 @@ def _cut(low, high, origin, cell, many):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def _cells(shapes, s, low, high, number, size):
     """Cells of a grid that a box meets: (x0, x1, y0, y1, z0, z1). number, size: where the grid's columns start."""
     origin, cell, many = row(shapes.size, s, size), shapes.size[s, size + 3], row(shapes.number, s, number + 1)
@@ -121,21 +121,21 @@ def _cells(shapes, s, low, high, number, size):
     return x0, x1, y0, y1, z0, z1
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _span(shapes, s, number, x, y, z0, z1):
     """Members of the cells z0 to z1 of column (x, y): the first, and one past the last."""
     at = shapes.number[s, number] + (x * shapes.number[s, number + 2] + y) * shapes.number[s, number + 3]
     return shapes.cell[at + z0], shapes.cell[at + max(z1 + 1, z0)]
 
 
-@kernel()
+@kernel(inner=True)
 def _take_triangle(shapes, near, t, low, high):
     if _meets(low, high, row(shapes.triangle, t, BOX_LOW), row(shapes.triangle, t, BOX_HIGH)):
         near.item[TRIANGLES, near.count[TRIANGLES]] = t
         near.count[TRIANGLES] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_triangles(shapes, near, s, low, high):
     """Triangles of shape s whose boxes meet the box (low, high), into `near`."""
     near.count[TRIANGLES] = 0
@@ -157,7 +157,7 @@ def gather_triangles(shapes, near, s, low, high):
                     _take_triangle(shapes, near, t, low, high)
 
 
-@kernel()
+@kernel(inner=True)
 def _take_ridge(shapes, near, e, low, high):
     a, b = (
         row(shapes.vertex, shapes.edge_part[e, END], PLACE),
@@ -171,7 +171,7 @@ def _take_ridge(shapes, near, e, low, high):
         near.count[RIDGES] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_edges(shapes, near, s, low, high):
     """Corners and convex edges of shape s that meet the box (low, high), into `near`, whose triangles are gathered in a box as large."""
     near.count[RIDGES] = near.count[CORNERS] = 0
@@ -200,7 +200,7 @@ def gather_edges(shapes, near, s, low, high):
                     near.count[CORNERS] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_points(shapes, near, s, low, high):
     """Face points or particles of shape s in the box (low, high), into `near`."""
     near.count[POINTS] = 0
