@@ -39,10 +39,12 @@ def kernel(*, inline: bool = False, inner: bool = False) -> Callable[[Callable[.
     inner: called by other kernels only; saves the time to compile what Python would need to call it.
     NaN and the order of sums are kept, so the same scenario gives the same bits on one machine.
     """
-    return numba.njit(
-        cache=True, error_model="numpy", fastmath={"contract"}, forceinline=inline,
-        no_cpython_wrapper=inner, no_cfunc_wrapper=inner,
-    )  # fmt: skip
+    # Numba knows the last two, its type hints do not.
+    unhinted: dict[str, Any] = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
+    decorate: Callable[[Callable[..., Any]], Any] = numba.njit(
+        cache=True, error_model="numpy", fastmath={"contract"}, forceinline=inline, **unhinted
+    )
+    return decorate
 
 
 def is_cold() -> bool:

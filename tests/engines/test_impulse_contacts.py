@@ -11,6 +11,7 @@ from contact_samples import (
     about,
     ball,
     box,
+    box_mesh,
     cloud_box,
     clump,
     contacts,
@@ -18,7 +19,9 @@ from contact_samples import (
     mesh,
     product,
     random_turn,
+    round_stone,
     scene,
+    subdivided,
 )
 
 from dem_cli.engines.impulse.detect import Touching
@@ -329,35 +332,21 @@ def test_box_in_the_corner_of_an_l(deep: float) -> None:
 
 def test_mesh_of_a_box_is_a_box() -> None:
     """Triangles across a flat face, and corners inside it, add no contact."""
-    import trimesh
-
-    fine = trimesh.Trimesh(*_parts(box())).subdivide().subdivide()
-    assert len(fine.faces) > 150
+    fine = mesh(*subdivided(*box_mesh([1.0, 1.0, 1.0]), 2))
     for shift, turn in [((0.3, 0.2), 0.0), ((0.0, 0.0), 0.3)]:
         coarse, finer = (
             contacts(stack(shift, turn, -1e-6)),
-            contacts(stack(shift, turn, -1e-6, mesh(fine.vertices, fine.faces))),
+            contacts(stack(shift, turn, -1e-6, fine)),
         )
         a, b = in_order(coarse), in_order(finer)
         np.testing.assert_allclose(coarse.point[a], finer.point[b], atol=1e-9)
         np.testing.assert_allclose(coarse.normal[a], finer.normal[b], atol=1e-9)
 
 
-def _parts(shape: Shape) -> tuple[Floats, np.ndarray]:
-    return shape.vertices, shape.triangles
-
-
-def round_stone(subdivisions: int, radius: float) -> Shape:
-    import trimesh
-
-    stone = trimesh.creation.icosphere(subdivisions, radius)
-    return mesh(stone.vertices, stone.faces)
-
-
 def test_round_meshes_touch_as_spheres_do() -> None:
-    """Meshes of 320 triangles about spheres: depth and normal as of spheres, to the height of their facets."""
+    """Meshes of 512 triangles about spheres: depth and normal as of spheres, to the height of their facets."""
     random = np.random.default_rng(3)
-    stone = round_stone(2, 0.5)
+    stone = round_stone(3, 0.5)
     sag = 0.5 - min(np.linalg.norm(stone.vertices[t].mean(axis=0)) for t in stone.triangles)
     for _ in range(40):
         n = random.normal(size=3)

@@ -109,7 +109,7 @@ def _gather(shapes, near, s, low, high, tight, wide):
         gather_edges(shapes, near, s, sub(low, t), add(high, t))
         gather_points(shapes, near, s, sub(low, t), add(high, t))
     else:
-        near.count[TRIANGLES] = near.count[RIDGES] = near.count[CORNERS] = 0
+        near.many[TRIANGLES] = near.many[RIDGES] = near.many[CORNERS] = 0
         gather_points(shapes, near, s, sub(low, w), add(high, w))
 
 

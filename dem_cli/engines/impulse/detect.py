@@ -92,5 +92,8 @@ class ContactSearch:
             )  # fmt: skip
             count = int(self._found.state[COUNT])
             if count <= len(self._found.i):
-                return Touching(*(array[:count] for array in self._found[:-1]))
+                f = self._found
+                return Touching(
+                    f.i[:count], f.j[:count], f.key[:count], f.point[:count], f.normal[:count], f.gap[:count]
+                )
             self._found = empty_found(count + count // 4)

@@ -84,7 +84,7 @@ def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, 
     i, j = rows
     si, sj = placed.shape[i], placed.shape[j]
     wide = limits[0] + limits[2]
-    for m in range(near_i.count[RIDGES]):
+    for m in range(near_i.many[RIDGES]):
         e = near_i.item[RIDGES, m]
         p, end = (
             placed_at(relation, row(shapes.vertex, shapes.edge_part[e, END], PLACE)),
@@ -99,7 +99,7 @@ def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, 
         )
         low = min(p[0], end[0]), min(p[1], end[1]), min(p[2], end[2])
         high = max(p[0], end[0]), max(p[1], end[1]), max(p[2], end[2])
-        for r in range(near_j.count[RIDGES]):
+        for r in range(near_j.many[RIDGES]):
             k = near_j.item[RIDGES, r]
             q, tip = (
                 row(shapes.vertex, shapes.edge_part[k, END], PLACE),

@@ -94,9 +94,9 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
     is from -depth to tolerance, and the body could touch it there; of those the nearest, and others only that face it across a valley.
     """
     tolerance, depth, border = limits
-    count, convex = near.count, shapes.number[s, CONVEX]
+    count, convex = near.many, shapes.number[s, CONVEX]
     count[HELD] = 0
-    for m in range(near.count[TRIANGLES]):
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         n = row(shapes.triangle, t, FACE_NORMAL)
         height = dot(sub(p, row(shapes.triangle, t, MIDDLE)), n)
@@ -118,7 +118,7 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
 @kernel(inner=True)
 def _nearest(shapes, near, tolerance):
     """Of the faces near.held those that are the nearest, or face all nearer ones, and are no higher than the tolerance."""
-    many = near.count[HELD]
+    many = near.many[HELD]
     for k in range(1, many):
         m, t, height = k, near.item[HELD, k], near.height[k]
         while m > 0 and (
@@ -174,14 +174,14 @@ def features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, own
     low, high = row(shapes.size, sb, LOW), row(shapes.size, sb, HIGH)
     low, high = (low[0] - wide, low[1] - wide, low[2] - wide), (high[0] + wide, high[1] + wide, high[2] + wide)
     other = 0 if sign > 0 else 1
-    for m in range(near_a.count[CORNERS]):
+    for m in range(near_a.many[CORNERS]):
         v = near_a.item[CORNERS, m]
         p = placed_at(relation, row(shapes.vertex, v, PLACE))
         if holds(low, high, p):
             many = touched_faces(shapes, near_b, sb, p, v, UNOPPOSED, relation, limits)
             v -= shapes.number[sa, VERTEX0]
             _put_faces(shapes, placed, near_b, many, found, pair, owner, p, CORNER_I + other, v, merge)
-    for m in range(near_a.count[POINTS]):
+    for m in range(near_a.many[POINTS]):
         k = near_a.item[POINTS, m]
         p = placed_at(relation, row(shapes.point, k, PLACE))
         if holds(low, high, p):

@@ -131,21 +131,21 @@ def _span(shapes, s, number, x, y, z0, z1):
 @kernel(inner=True)
 def _take_triangle(shapes, near, t, low, high):
     if _meets(low, high, row(shapes.triangle, t, BOX_LOW), row(shapes.triangle, t, BOX_HIGH)):
-        near.item[TRIANGLES, near.count[TRIANGLES]] = t
-        near.count[TRIANGLES] += 1
+        near.item[TRIANGLES, near.many[TRIANGLES]] = t
+        near.many[TRIANGLES] += 1
 
 
 @kernel(inner=True)
 def gather_triangles(shapes, near, s, low, high):
     """Triangles of shape s whose boxes meet the box (low, high), into `near`."""
-    near.count[TRIANGLES] = 0
+    near.many[TRIANGLES] = 0
     start, end = shapes.number[s, TRIANGLE0], shapes.number[s + 1, TRIANGLE0]
     if end - start <= FEW:
         for t in range(start, end):
             _take_triangle(shapes, near, t, low, high)
         return
-    near.count[STAMP] += 1
-    stamp = near.count[STAMP]
+    near.many[STAMP] += 1
+    stamp = near.many[STAMP]
     x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, TRIANGLE_GRID, TRIANGLE_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
@@ -167,25 +167,25 @@ def _take_ridge(shapes, near, e, low, high):
         min(a[0], b[0]) <= high[0] and max(a[0], b[0]) >= low[0] and min(a[1], b[1]) <= high[1]
         and max(a[1], b[1]) >= low[1] and min(a[2], b[2]) <= high[2] and max(a[2], b[2]) >= low[2]
     ):  # fmt: skip
-        near.item[RIDGES, near.count[RIDGES]] = e
-        near.count[RIDGES] += 1
+        near.item[RIDGES, near.many[RIDGES]] = e
+        near.many[RIDGES] += 1
 
 
 @kernel(inner=True)
 def gather_edges(shapes, near, s, low, high):
     """Corners and convex edges of shape s that meet the box (low, high), into `near`, whose triangles are gathered in a box as large."""
-    near.count[RIDGES] = near.count[CORNERS] = 0
+    near.many[RIDGES] = near.many[CORNERS] = 0
     if shapes.number[s + 1, TRIANGLE0] - shapes.number[s, TRIANGLE0] <= FEW:
         for k in range(shapes.number[s, RIDGE0], shapes.number[s + 1, RIDGE0]):
             _take_ridge(shapes, near, shapes.ridge[k], low, high)
         for k in range(shapes.number[s, CORNER0], shapes.number[s + 1, CORNER0]):
             if holds(low, high, row(shapes.vertex, shapes.corner[k], PLACE)):
-                near.item[CORNERS, near.count[CORNERS]] = shapes.corner[k]
-                near.count[CORNERS] += 1
+                near.item[CORNERS, near.many[CORNERS]] = shapes.corner[k]
+                near.many[CORNERS] += 1
         return
-    near.count[STAMP] += 1
-    stamp = near.count[STAMP]
-    for m in range(near.count[TRIANGLES]):
+    near.many[STAMP] += 1
+    stamp = near.many[STAMP]
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         for k in range(3):
             e, v = shapes.triangle_part[t, TRIANGLE_EDGE + k], shapes.triangle_part[t, TRIANGLE_VERTEX + k]
@@ -196,14 +196,14 @@ def gather_edges(shapes, near, s, low, high):
             if near.seen[2, v] != stamp:
                 near.seen[2, v] = stamp
                 if shapes.vertex_part[v, IS_CORNER] and holds(low, high, row(shapes.vertex, v, PLACE)):
-                    near.item[CORNERS, near.count[CORNERS]] = v
-                    near.count[CORNERS] += 1
+                    near.item[CORNERS, near.many[CORNERS]] = v
+                    near.many[CORNERS] += 1
 
 
 @kernel(inner=True)
 def gather_points(shapes, near, s, low, high):
     """Face points or particles of shape s in the box (low, high), into `near`."""
-    near.count[POINTS] = 0
+    near.many[POINTS] = 0
     x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, POINT_GRID, POINT_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
@@ -211,5 +211,5 @@ def gather_points(shapes, near, s, low, high):
             for m in range(first, last):
                 k = shapes.member[m]
                 if holds(low, high, row(shapes.point, k, PLACE)):
-                    near.item[POINTS, near.count[POINTS]] = k
-                    near.count[POINTS] += 1
+                    near.item[POINTS, near.many[POINTS]] = k
+                    near.many[POINTS] += 1

@@ -80,7 +80,7 @@ def keep_beyond(shapes, placed, near, i, n, least, faces):
     way = turned_back(turn_of(placed, i), n)
     from_center, f = dot(row(placed.frame, i, CENTER), n), 1.0 / placed.frame[i, SCALE]
     least, faces = (least - from_center) * f, (faces - from_center) * f
-    item, count, part = near.item, near.count, shapes.triangle_part
+    item, count, part = near.item, near.many, shapes.triangle_part
     kept = 0
     for m in range(count[TRIANGLES]):
         t = item[TRIANGLES, m]

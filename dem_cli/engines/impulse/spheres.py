@@ -158,7 +158,7 @@ def _at_rim(shapes, t, kind, feature):
 def _nearest_feature(shapes, near, c):
     """(distance, triangle, point, kind, feature) of the gathered triangle nearest to c, and whether c is inside."""
     least, best, q, kind, feature = np.inf, -1, c, FACE, -1
-    for m in range(near.count[TRIANGLES]):
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         p, k, f = closest_on_triangle(shapes, t, c)
         d = sub(c, p)
@@ -206,7 +206,7 @@ def sphere_on_mesh(shapes, placed, near, found, pair, owner, c, r, a, tolerance,
         point = to_world(placed, b, along(q, n, 0.5 * gap))
         put_new(found, pair, key, point, turned(turn, times(n, -sign)), gap * scale, merge, SAME)
         return
-    for m in range(near.count[TRIANGLES]):
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         q, kind, feature = closest_on_triangle(shapes, t, c)
         d = sub(c, q)
