@@ -116,7 +116,7 @@ def test_random_impacts_keep_momentum_and_gain_no_energy(method: str) -> None:
     for seed in range(306):
         contacts, e, mu = settings(seed)
         case = random_impact(seed, contacts)
-        after = solve(case, e, mu, method)
+        after = solve(case, e, mu, method, tolerance=1e-8)
         for before, now in zip(case.momenta(case.velocity), case.momenta(after.velocity), strict=True):
             assert np.abs(now - before).max() < 1e-12 * max(1.0, float(np.abs(before).max()))
         energy = case.kinetic(case.velocity)
@@ -125,7 +125,7 @@ def test_random_impacts_keep_momentum_and_gain_no_energy(method: str) -> None:
         across = np.linalg.norm(after.impulse - along[:, None] * case.normal, axis=1)
         assert np.all(along >= 0.0)
         assert np.all(across <= mu * along + 1e-12)
-        assert np.einsum("ca,ca->c", case.closing(after.velocity), case.normal).min() >= -2e-6
+        assert np.einsum("ca,ca->c", case.closing(after.velocity), case.normal).min() >= -1e-6
 
 
 @pytest.mark.parametrize("method", SOLVERS)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from dem_cli.engines.impulse.pgs import SMALL, sweep_until_still
-from dem_cli.engines.impulse.rows import FRICTION, NORMAL, RESTITUTION, TARGET, push, relative, vector
+from dem_cli.engines.impulse.rows import FRICTION, NORMAL, RESTITUTION, TARGET, push_all, relative_of_all, vector
 from dem_cli.engines.impulse.tracking import track_energy
 from dem_cli.engines.impulse.vectors import dot
 from dem_cli.jit import kernel
@@ -16,22 +16,23 @@ PGS, TRACKING = 0, 1
 GAIN = 1e-12  # share of the energy exchanged that counts as rounding
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def work_done(first, last, i, j, rows, velocity, impulse, start):
     """Energy [J] that the impulses of contacts first..last - 1 have brought to the bodies, the sum of J.(u before + u after)/2, and
     the sum of |J.u before|.
 
     start (c, 3): u before [m/s].
     """
-    gained, exchanged = 0.0, 0.0
+    gained, exchanged, after = 0.0, 0.0, np.empty((last - first, 3))
+    relative_of_all(first, last, i, j, rows, velocity, after)
     for c in range(first, last):
         one, before = vector(impulse[c], 0), vector(start[c], 0)
-        gained += 0.5 * (dot(one, before) + dot(one, relative(rows[c], velocity[i[c]], velocity[j[c]])))
+        gained += 0.5 * (dot(one, before) + dot(one, vector(after[c - first], 0)))
         exchanged += abs(dot(one, before))
     return gained, exchanged
 
 
-@kernel(inline=True)
+@kernel(inner=True)
 def back_to(first, last, i, j, velocity, before, impulse):
     """Puts the velocities of the island's bodies back to `before`, and its impulses to zero."""
     for c in range(first, last):
@@ -40,7 +41,7 @@ def back_to(first, last, i, j, velocity, before, impulse):
         impulse[c] = 0.0
 
 
-@kernel()
+@kernel(inner=True)
 def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, start, tolerance, most):
     """Blends an impact that gained energy with one without restitution, so that none is gained.
 
@@ -52,11 +53,9 @@ def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, st
     exchange = last - first
     rebound, after = np.empty((exchange, 3)), np.empty((exchange, 3))
     gain_e, _ = work_done(first, last, i, j, rows, velocity, impulse, start)
+    relative_of_all(first, last, i, j, rows, velocity, after)
     for c in range(first, last):
         rebound[c - first] = impulse[c]
-        u = relative(rows[c], velocity[i[c]], velocity[j[c]])
-        for axis in range(3):
-            after[c - first, axis] = u[axis]
         rows[c, TARGET] = 0.0
     back_to(first, last, i, j, velocity, before, impulse)
     sweeps, residual, done = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
@@ -68,11 +67,11 @@ def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, st
         more, _, done = sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most)
         rows[first:last, FRICTION] = friction
         return sweeps + more, residual, done
-    square = 0.0
-    for c in range(first, last):
-        u = relative(rows[c], velocity[i[c]], velocity[j[c]])
+    square, stopped = 0.0, np.empty((exchange, 3))
+    relative_of_all(first, last, i, j, rows, velocity, stopped)
+    for k in range(exchange):
         for axis in range(3):
-            square += 0.5 * (rebound[c - first, axis] - impulse[c, axis]) * (after[c - first, axis] - u[axis])
+            square += 0.5 * (rebound[k, axis] - impulse[first + k, axis]) * (after[k, axis] - stopped[k, axis])
     slope = gain_e - gain_0 - square
     share = 0.0
     if square > 0.0:
@@ -83,9 +82,8 @@ def guard_energy(first, last, i, j, rows, velocity, inverse, impulse, before, st
         for axis in range(3):
             blended[c - first, axis] = impulse[c, axis] + share * (rebound[c - first, axis] - impulse[c, axis])
     back_to(first, last, i, j, velocity, before, impulse)
-    for c in range(first, last):
-        impulse[c] = blended[c - first]
-        push(rows[c], vector(impulse[c], 0), velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
+    impulse[first:last] = blended
+    push_all(first, last, i, j, rows, velocity, inverse, blended)
     return sweeps, residual, done
 
 
@@ -126,8 +124,10 @@ def solve_impact(
             first, last, i, j, rows, velocity, inverse, impulse, before, start, tolerance, most
         )
         iterations, residual, done = iterations + more, max(residual, left), done and ended
+    after = np.empty((last - first, 3))
+    relative_of_all(first, last, i, j, rows, velocity, after)
     for c in range(first, last):
-        along = dot(relative(rows[c], velocity[i[c]], velocity[j[c]]), vector(rows[c], NORMAL))
+        along = dot(vector(after[c - first], 0), vector(rows[c], NORMAL))
         met = dot(vector(impulse[c], 0), vector(rows[c], NORMAL)) > 0.0
         rows[c, TARGET] = max(0.0, along) if met else 0.0
     return iterations, residual, not done

@@ -7,7 +7,7 @@ import numpy as np
 from dem_cli.jit import kernel
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def root(parent, k):
     while parent[k] != k:
         parent[k] = parent[parent[k]]

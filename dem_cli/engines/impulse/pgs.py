@@ -28,13 +28,13 @@ SMALL, FINE, FINE_SWEEPS = 64, 1e-7, 500
 ENOUGH = 1e-2  # of the first change: larger islands are not solved to less
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def aim_of(contacts, tolerance):
     """The change of velocity [m/s] at which the solution of an island ends; one that ends below `tolerance` hit no cap either way."""
     return tolerance * FINE if contacts <= SMALL else tolerance
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def new_impulse(row, old, u):
     """The impulse [N s] of one contact that, with all others as they are, lets its bodies neither approach nor slide; or with
     sliding, the impulse on the friction cone. old: the present one, u: relative velocity with it.
@@ -60,7 +60,7 @@ def new_impulse(row, old, u):
     return plus(scaled(along, n), most / size if size > most else 1.0, shear)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def sweep(first, last, backwards, i, j, rows, velocity, inverse, impulse, change):
     """One sweep over the contacts first..last - 1; returns the sum of the squared changes of their velocities [m^2/s^2], and that of the
     energies dJ.K.dJ [J] that the changes dJ stand for.
@@ -84,7 +84,7 @@ def sweep(first, last, backwards, i, j, rows, velocity, inverse, impulse, change
     return speeds, energies
 
 
-@kernel()
+@kernel(inner=True)
 def sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most):
     """Solves the contacts first..last - 1 of an island; returns sweeps done, the change of velocity [m/s] in the last one, root mean square,
     and whether that is enough.

@@ -8,7 +8,7 @@ from dem_cli.engines.impulse.vectors import cross, dot, plus, scaled
 from dem_cli.jit import kernel
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def turned(q, a):
     """The vector a turned by the unit quaternion q: w, x, y, z."""
     u = (q[1], q[2], q[3])
@@ -16,13 +16,13 @@ def turned(q, a):
     return plus(plus(a, q[0], t), 1.0, cross(u, t))
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def turned_back(q, a):
     """The vector a turned by the inverse of the unit quaternion q."""
     return turned((q[0], -q[1], -q[2], -q[3]), a)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def after_turn(q, w, h):
     """The quaternion q after a turn with angular velocity w [rad/s] over h [s], of unit length."""
     speed = math.sqrt(dot(w, w))

@@ -18,17 +18,17 @@ STIFF, STIFF_ACROSS, FRICTION, RESTITUTION, TARGET = 21, 22, 23, 24, 25
 WIDTH = 26
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def vector(row, at):
     return row[at], row[at + 1], row[at + 2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def symmetric(row, at):
     return row[at], row[at + 1], row[at + 2], row[at + 3], row[at + 4], row[at + 5]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def relative(row, of_i, of_j):
     """u [m/s] from the velocities (6,) of the two bodies."""
     ri, rj = vector(row, ARM_I), vector(row, ARM_J)
@@ -40,7 +40,7 @@ def relative(row, of_i, of_j):
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def push(row, impulse, of_i, of_j, inverse_i, inverse_j):
     """Changes the velocities (6,) of the two bodies by the impulse [N s] on j, and its opposite on i."""
     turn_i = symmetric_times(symmetric(inverse_i, 1), cross(vector(row, ARM_I), impulse))
@@ -52,7 +52,23 @@ def push(row, impulse, of_i, of_j, inverse_i, inverse_j):
         of_j[3 + axis] += turn_j[axis]
 
 
-@kernel(inline=True)
+@kernel(inner=True)
+def relative_of_all(first, last, i, j, rows, velocity, u):
+    """Writes u (last - first, 3) [m/s] of the contacts first..last - 1."""
+    for c in range(first, last):
+        one = relative(rows[c], velocity[i[c]], velocity[j[c]])
+        for axis in range(3):
+            u[c - first, axis] = one[axis]
+
+
+@kernel(inner=True)
+def push_all(first, last, i, j, rows, velocity, inverse, impulse):
+    """Applies the impulses (last - first, 3) [N s] of the contacts first..last - 1."""
+    for c in range(first, last):
+        push(rows[c], vector(impulse[c - first], 0), velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
+
+
+@kernel(inline=True, inner=True)
 def of_both(inverse_i, inverse_j, ri, rj, unit):
     """K times a vector."""
     turn_i = cross(symmetric_times(symmetric(inverse_i, 1), cross(ri, unit)), ri)

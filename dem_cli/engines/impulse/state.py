@@ -37,16 +37,18 @@ from dem_cli.engines.impulse.step import (
 )
 from dem_cli.rigid import Bodies, BodyContacts, ImpulseEnergy, Scene, Solving
 from dem_cli.scenario import ImpulseScenario
-from dem_cli.state import Floats, Ints
+from dem_cli.state import Bools, Floats, Ints
 
 QUANTA, QUANTA_AT_MOST = 50, 100000  # of energy tracking where it stands in for sweeps that do not end
-GAP = 1e-6  # of the smallest body's reach: contacts further apart than this do not touch
+# Of the smallest body's reach: bodies further apart than this do not touch; those that touched in the step before may be further apart, so
+# that resting contacts do not flicker, while bodies that are a hair apart meet one after the other.
+GAP, KEPT_GAP = 1e-10, 1e-6
 
 
-def copied(found: Found) -> Found:
-    """Contacts that outlive the next look."""
+def chosen(found: Found, which: Bools) -> Found:
+    """Some of the contacts, copied, so that they outlive the next look."""
     return Found(
-        found.i.copy(), found.j.copy(), found.key.copy(), found.point.copy(), found.normal.copy(), found.gap.copy()
+        found.i[which], found.j[which], found.key[which], found.point[which], found.normal[which], found.gap[which]
     )
 
 
@@ -54,7 +56,7 @@ def copied(found: Found) -> Found:
 class ImpulseState:
     """Arrays that move, and the constants that they move by.
 
-    last: the contacts of the last step, with i, j as the search has them. energies (ENERGIES,) [J], counts (COUNTS,): see `step.py`.
+    last, found: the contacts of the last step, in `found` with i, j as the search has them. smallest [m]: reach of the smallest body. energies (ENERGIES,) [J], counts (COUNTS,): see `step.py`.
     start: stored energy at the start [J]; lowest: lowest potential energy so far [J]; given: positive work so far [J]; escaped: energy
     carried off [J]; deepest: largest penetration since the last look over the smaller body's reach, with its two bodies.
     """
@@ -64,7 +66,7 @@ class ImpulseState:
     rules: Rules
     gravity: Floats
     search: ContactSearch
-    tolerance: float
+    smallest: float
     materials: Ints
     time: float = 0.0
     steps: int = 0
@@ -97,14 +99,14 @@ class ImpulseState:
         fixed = [*scene.planes.material.tolist(), *([scene.terrain.material] if scene.terrain else [])]
         # Wall w, which contacts call -1 - w, is then entry -1 - w of the array, too.
         materials = np.array([*bodies.material.tolist(), *reversed(fixed)], dtype=np.int64)
-        state = cls(scene, moving, rules, gravity, ContactSearch(scene), GAP * float(size.min()), materials)
+        state = cls(scene, moving, rules, gravity, ContactSearch(scene), float(size.min()), materials)
         turn_inverse(moving.present, moving.q, moving.mass, moving.inertia, moving.inverse)
         return state
 
     def look(self) -> Touching:
         """Contacts where the bodies are now, with the load impulses that they had in the step before."""
         n, moving, last, before = len(self.moving.mass), self.moving, self.last, self.found
-        found = copied(self.search.look(moving.x[:n], moving.q, self.tolerance))
+        found = self._touching(self.search.look(moving.x[:n], moving.q, KEPT_GAP * self.smallest))
         of_i, of_j = self.materials[found.i], self.materials[found.j]
         load = np.empty((len(found.i), 3))
         if last is not None and before is not None:
@@ -118,6 +120,15 @@ class ImpulseState:
             self.scene.restitution[of_i, of_j], self.scene.friction[of_i, of_j],
             new, load, np.zeros_like(load), np.zeros(len(load), dtype=bool),
         )  # fmt: skip
+
+    def _touching(self, near: Found) -> Found:
+        """Those of the contacts nearby that touch: closer than GAP, or of two bodies that touched in the step before."""
+        touch = near.gap <= GAP * self.smallest
+        if not touch.all() and self.found is not None:
+            count = len(self.moving.mass) + len(self.scene.planes) + 2
+            pairs, before = (one.i * count + (one.j % count) for one in (near, self.found))
+            touch |= np.isin(pairs, before)
+        return chosen(near, touch)
 
     def _watch(self, found: Found) -> None:
         """Keeps the largest penetration."""

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from dem_cli.engines.impulse.impact import solve_impact
+from dem_cli.engines.impulse.impact import back_to, solve_impact, work_done
 from dem_cli.engines.impulse.islands import split_islands
 from dem_cli.engines.impulse.pgs import sweep_until_still
 from dem_cli.engines.impulse.quaternions import after_turn
@@ -26,7 +26,9 @@ from dem_cli.engines.impulse.rows import (
     WIDTH,
     fill_rows,
     push,
+    push_all,
     relative,
+    relative_of_all,
     vector,
 )
 from dem_cli.engines.impulse.tracking import link_contacts
@@ -34,6 +36,7 @@ from dem_cli.engines.impulse.vectors import dot, scaled
 from dem_cli.jit import kernel
 
 PROJECTION_SWEEPS = 10
+SPURIOUS = 1e-9  # share of the energy exchanged that a load may gain by rounding
 AT_CONE = 1.0 - 1e-6  # share of the friction limit from which a contact counts as sliding
 
 
@@ -125,10 +128,7 @@ def solve_step(dt, gravity, driving, moving, found, rules, energies, counts):
     fill_rows(
         i, j, found.point[order], found.normal[order], moving.x, inverse, found.restitution[order], found.friction[order], rows
     )  # fmt: skip
-    for c in range(contacts):
-        u = relative(rows[c], velocity[i[c]], velocity[j[c]])
-        for axis in range(3):
-            start[c, axis] = u[axis]
+    relative_of_all(0, contacts, i, j, rows, velocity, start)
     fall = (gravity[0] + driving[0], gravity[1] + driving[1], gravity[2] + driving[2])
     rebound_at_surface(dt, fall, bodies, j, rows, start, found.gap[order], found.new[order])
     hit = solve_impacts(starts, i, j, rows, moving, before, start, rules, counts)
@@ -160,7 +160,7 @@ def solve_step(dt, gravity, driving, moving, found, rules, energies, counts):
         counts[LARGEST] = max(counts[LARGEST], starts[k + 1] - starts[k])
 
 
-@kernel()
+@kernel(inner=True)
 def rebound_at_surface(dt, fall, bodies, j, rows, start, gap, new):
     """Restitution of new contacts with what never moves, as if they had met at the surface and not where this step finds them.
 
@@ -179,7 +179,7 @@ def rebound_at_surface(dt, fall, bodies, j, rows, start, gap, new):
         rows[c, RESTITUTION] = min(max(leaving / v, 0.0), 1.0) if rows[c, RESTITUTION] > 0.0 else 0.0
 
 
-@kernel()
+@kernel(inner=True)
 def solve_impacts(starts, i, j, rows, moving, before, start, rules, counts):
     """The impact phase of all islands; returns its impulses (c, 3) [N s]."""
     hit = np.zeros((len(i), 3))
@@ -195,7 +195,7 @@ def solve_impacts(starts, i, j, rows, moving, before, start, rules, counts):
     return hit
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def note(counts, which, iterations, residual, capped):
     counts[which] += iterations
     counts[MOST] = max(counts[MOST], iterations)
@@ -203,38 +203,28 @@ def note(counts, which, iterations, residual, capped):
     counts[CAPPED] += 1.0 if capped else 0.0
 
 
-@kernel()
+@kernel(inner=True)
 def solve_load(starts, i, j, rows, velocity, inverse, load, rules, counts):
-    """The load phase of all islands: from the impulses (c, 3) of the step before, which are applied first. A solve that hits its cap with energy
-    gained is done again without friction."""
+    """The load phase of all islands: from the impulses (c, 3) of the step before, which are applied first.
+
+    A solve that hits its cap with energy gained is done again without friction.
+    """
+    before, start = velocity.copy(), np.empty((len(i), 3))
+    relative_of_all(0, len(i), i, j, rows, velocity, start)
     for k in range(len(starts) - 1):
         first, last = starts[k], starts[k + 1]
-        kicked, saved = np.empty((last - first, 3)), np.empty((last - first, 12))
-        for c in range(first, last):
-            u = relative(rows[c], velocity[i[c]], velocity[j[c]])
-            for axis in range(3):
-                kicked[c - first, axis] = u[axis]
-            saved[c - first, :6] = velocity[i[c]]
-            saved[c - first, 6:] = velocity[j[c]]
-        for c in range(first, last):
-            push(rows[c], vector(load[c], 0), velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
+        push_all(first, last, i, j, rows, velocity, inverse, load[first:last])
         sweeps, residual, done = sweep_until_still(
             first, last, i, j, rows, velocity, inverse, load, rules.tolerance, rules.most
         )
         if not done:
-            gained, exchanged = 0.0, 0.0
-            for c in range(first, last):
-                one, u = vector(load[c], 0), relative(rows[c], velocity[i[c]], velocity[j[c]])
-                lifted = rows[c, TARGET] * dot(one, vector(rows[c], NORMAL))
-                gained += 0.5 * (dot(one, vector(kicked[c - first], 0)) + dot(one, u)) - lifted
-                exchanged += abs(dot(one, vector(kicked[c - first], 0)))
-            if gained > 1e-9 * exchanged:
+            gained, exchanged = work_done(first, last, i, j, rows, velocity, load, start)
+            for c in range(first, last):  # a rebound is held against gravity, which is no gain
+                gained -= rows[c, TARGET] * dot(vector(load[c], 0), vector(rows[c], NORMAL))
+            if gained > SPURIOUS * exchanged:
                 friction = rows[first:last, FRICTION].copy()
                 rows[first:last, FRICTION] = 0.0
-                for c in range(first, last):
-                    velocity[i[c]] = saved[c - first, :6]
-                    velocity[j[c]] = saved[c - first, 6:]
-                    load[c] = 0.0
+                back_to(first, last, i, j, velocity, before, load)
                 more, _, _ = sweep_until_still(
                     first, last, i, j, rows, velocity, inverse, load, rules.tolerance, rules.most
                 )
@@ -243,14 +233,16 @@ def solve_load(starts, i, j, rows, velocity, inverse, load, rules, counts):
         note(counts, LOAD_SWEEPS, sweeps, residual, not done)
 
 
-@kernel()
+@kernel(inner=True)
 def book(i, j, rows, velocity, start, hit, load, energies):
     """Adds what this step's impulses have lost, -J.(u before + u after)/2, its normal part and the rest.
 
     With the velocities before the impact and after the load this is exact: the work of gravity in between is that of both half drifts.
     """
+    after = np.empty((len(i), 3))
+    relative_of_all(0, len(i), i, j, rows, velocity, after)
     for c in range(len(i)):
-        n, u = vector(rows[c], NORMAL), relative(rows[c], velocity[i[c]], velocity[j[c]])
+        n, u = vector(rows[c], NORMAL), vector(after[c], 0)
         one = (hit[c, 0] + load[c, 0], hit[c, 1] + load[c, 1], hit[c, 2] + load[c, 2])
         mean = scaled(0.5, (u[0] + start[c, 0], u[1] + start[c, 1], u[2] + start[c, 2]))
         along = dot(one, n) * dot(mean, n)
@@ -268,18 +260,19 @@ def take_back(dt, starts, i, j, rows, gap, moving, rules, gravity):
     for k in range(len(starts) - 1):
         first, last = starts[k], starts[k + 1]
         deep = False
-        goal, push_out = np.zeros(last - first), np.zeros(last - first)
+        goal, push_out, parting = np.zeros(last - first), np.zeros(last - first), np.empty((last - first, 3))
+        relative_of_all(first, last, i, j, rows, moving.velocity, parting)
         for c in range(first, last):
             size = moving.size[i[c]] if j[c] == len(moving.mass) else min(moving.size[i[c]], moving.size[j[c]])
-            parting = dot(relative(rows[c], moving.velocity[i[c]], moving.velocity[j[c]]), vector(rows[c], NORMAL))
-            goal[c - first] = max(0.0, rules.correction * (-gap[c] - rules.slop * size) - max(parting, 0.0) * dt)
+            own = dt * max(dot(vector(parting[c - first], 0), vector(rows[c], NORMAL)), 0.0)
+            goal[c - first] = max(0.0, rules.correction * (-gap[c] - rules.slop * size) - own)
             deep = deep or goal[c - first] > 0.0
         if deep:
             gained += move_apart(first, last, i, j, rows, goal, push_out, moving, gravity)
     return gained
 
 
-@kernel()
+@kernel(inner=True)
 def move_apart(first, last, i, j, rows, goal, push_out, moving, gravity):
     """The displacements of one island, u.n >= goal (contacts,) [m] for each, by projected Gauss-Seidel.
 

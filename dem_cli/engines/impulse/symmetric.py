@@ -5,7 +5,7 @@ from __future__ import annotations
 from dem_cli.jit import kernel
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def symmetric_times(m, a):
     """The symmetric matrix m times a."""
     return (
@@ -15,7 +15,7 @@ def symmetric_times(m, a):
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def symmetric_inverse(m):
     """Inverse of a symmetric positive definite matrix, by cofactors."""
     xx = m[1] * m[2] - m[5] * m[5]

@@ -34,7 +34,7 @@ PAIRS = 50  # compressions with release at most
 GUARD = 0.05  # least n.K.(n + mu t) over n.K.n: below, sliding feeds the approach (Painleve)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def quantum(row, u, gain):
     """The impulse [N s] that changes u.n by `gain` [m/s], and stops the slip u_t where friction suffices: J = K^-1 (gain n - u_t), if that
     lies in the friction cone. Else J = J_n n + J_t t with J_t = mu J_n, J_n = gain / n.K.(n + mu t), up to the end of the slip.
@@ -79,7 +79,7 @@ def link_contacts(i, j, bodies):
     return head, following
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def look_again(body, i, j, rows, velocity, head, following, speed):
     """Refreshes speed = u.n of the contacts of one body."""
     entry = head[body]
@@ -89,7 +89,7 @@ def look_again(body, i, j, rows, velocity, head, following, speed):
         entry = following[entry]
 
 
-@kernel()
+@kernel(inner=True)
 def apply_quanta(
     first, last, chosen, i, j, rows, velocity, inverse, head, following, speed, gain, quanta, impulse, work
 ):
@@ -118,7 +118,7 @@ def apply_quanta(
             work[c] -= 0.5 * (gain[c] + speed[c]) * dot(vector(quanta[c], 0), vector(rows[c], NORMAL))
 
 
-@kernel()
+@kernel(inner=True)
 def choose(first, last, values, least, slack, chosen):
     """Marks the contacts whose value lies within `slack` of the largest and above `least`; returns their number."""
     largest = least
@@ -131,7 +131,7 @@ def choose(first, last, values, least, slack, chosen):
     return number
 
 
-@kernel()
+@kernel(inner=True)
 def track_energy(first, last, i, j, rows, velocity, inverse, impulse, head, following, quanta, tolerance, most):
     """Solves the impact of the contacts first..last - 1 of an island; returns iterations and the fastest approach left [m/s].
 

@@ -115,18 +115,18 @@ def set_turns(placed, x, q, n):
         f[i, TURN + 5], f[i, TURN + 7] = 2.0 * (b * c - w * a), 2.0 * (b * c + w * a)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def plus(a, s, b):
     """a + s b."""
     return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def scaled(s, a):
     return s * a[0], s * a[1], s * a[2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def across(n):
     """A unit vector at right angles to the unit vector n."""
     if abs(n[0]) < 0.6:
