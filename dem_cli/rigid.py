@@ -147,6 +147,18 @@ class BodyContacts:
         return len(self.i)
 
 
+def touching_pairs(contacts: BodyContacts) -> Ints:
+    """Distinct pairs (i, j) of the contacts, shape (p, 2); j < 0 is a plane or the terrain."""
+    return np.unique(np.stack([contacts.i, contacts.j], axis=1), axis=0)
+
+
+def coordination(contacts: BodyContacts, n: int) -> Ints:
+    """Bodies, planes and terrain that each of n bodies touches, shape (n,)."""
+    pairs = touching_pairs(contacts)
+    others = pairs[pairs[:, 1] >= 0, 1]
+    return np.bincount(pairs[:, 0], minlength=n) + np.bincount(others, minlength=n)
+
+
 @dataclass(frozen=True)
 class ImpulseEnergy:
     """Ledger of energy in joules, all counted from the start of the run.

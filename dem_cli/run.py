@@ -11,24 +11,27 @@ from typing import Any
 
 import numpy as np
 
+from dem_cli.analysis.bodies3d import measure_bodies
 from dem_cli.analysis.measures import Measures, measure_frame, series_row
 from dem_cli.analysis.quasi_static import IncrementMeasures, measure_increment
 from dem_cli.analysis.surface import bin_centers
 from dem_cli.analysis.void_ratio import WindowMargins
 from dem_cli.assembly import Assembly, build_assembly
+from dem_cli.assembly.scene import build_scene
 from dem_cli.errors import RunError
 from dem_cli.interrupts import marked_interrupts
-from dem_cli.results import ResultWriter
+from dem_cli.results import ImpulseWriter, ResultWriter
 from dem_cli.results.files import check_target
-from dem_cli.scenario import DiscScenario, QuasiStaticScenario, Scenario, Shake
+from dem_cli.rigid import BodyFrame, Scene
+from dem_cli.scenario import DiscScenario, ImpulseScenario, QuasiStaticScenario, Scenario, Shake
 from dem_cli.state import Bonds, Frame, Grains, Increment, Ints, Walls
 
 # Told of every frame, with its row of the series where it has one, and of every increment, with its row.
-Listener = Callable[[Frame | Increment, Mapping[str, float] | None], None]
+Listener = Callable[[Frame | Increment | BodyFrame, Mapping[str, float] | None], None]
 
 
 def run_scenario(
-    scenario: Scenario | QuasiStaticScenario,
+    scenario: Scenario | QuasiStaticScenario | ImpulseScenario,
     target: Path,
     *,
     force: bool = False,
@@ -41,16 +44,23 @@ def run_scenario(
     no equilibrium; after that, and after Ctrl-C, what was written stays readable under the partial name (`results.partial_path`).
     """
     check_target(target, force=force)
-    assembly = assemble(scenario, packing_listener)
-    if isinstance(scenario, QuasiStaticScenario):
-        run_increments(scenario, assembly, target, force, listener)
+    with telling(packing_listener) as tell:
+        start = build_scene(scenario, tell) if isinstance(scenario, ImpulseScenario) else build_assembly(scenario, tell)
+    if isinstance(scenario, ImpulseScenario):
+        assert isinstance(start, Scene)
+        run_bodies(scenario, start, target, force, listener)
+    elif isinstance(scenario, QuasiStaticScenario):
+        assert isinstance(start, Assembly)
+        run_increments(scenario, start, target, force, listener)
     else:
-        run_frames(scenario, assembly, target, force, listener)
+        assert isinstance(start, Assembly)
+        run_frames(scenario, start, target, force, listener)
     return target
 
 
-def assemble(scenario: Scenario | QuasiStaticScenario, packing_listener: Callable[[str], None] | None) -> Assembly:
-    """Grains and walls at the start of a scenario of any engine."""
+@contextmanager
+def telling(packing_listener: Callable[[str], None] | None) -> Iterator[Callable[[str], None]]:
+    """What a packing tells of itself: passed on, unless an interrupt has come."""
     with marked_interrupts() as check:
 
         def tell(words: str) -> None:
@@ -58,7 +68,33 @@ def assemble(scenario: Scenario | QuasiStaticScenario, packing_listener: Callabl
             if packing_listener:
                 packing_listener(words)
 
-        return build_assembly(scenario, tell)
+        yield tell
+
+
+def run_bodies(scenario: ImpulseScenario, scene: Scene, target: Path, force: bool, listener: Listener | None) -> None:
+    """A run over time of rigid bodies in three dimensions: frames of the impulse engine."""
+    from dem_cli.engines.impulse.engine import ImpulseEngine
+
+    engine = ImpulseEngine(scenario, scene)
+    container, tracks = scenario.container, scenario.output.tracks
+    with marked_interrupts() as engine.check, ImpulseWriter(
+        target, scenario_text=scenario.source, resolved_toml=scenario.resolved_toml(), scenario_hash=scenario.hash,
+        seed=scenario.seed, title=scenario.title, scene=scene, gravity=engine.gravity,
+        container={"width": container.width, "breadth": container.breadth, "height": container.height},
+        tracks=np.array(tracks.grains) if tracks else None, force=force,
+    ) as writer:  # fmt: skip
+        row: dict[str, float] | None = None
+        with warned(writer):
+            for frame in engine.frames():
+                if frame.step == 0 and frame.stage_start:
+                    frame = replace(frame, warnings=(*scene.warnings, *frame.warnings))
+                measured = bool(frame.due & {"series", "frames"})
+                row = measure_bodies(frame, scene) if measured else row
+                write_bodies(writer, scenario, frame, row)
+                if listener:
+                    listener(frame, row if measured else None)
+                engine.check()
+        writer.finish("all stages are done")
 
 
 def run_frames(scenario: Scenario, assembly: Assembly, target: Path, force: bool, listener: Listener | None) -> None:
@@ -114,6 +150,25 @@ def run_increments(
                         listener(increment, measures.row)
                     engine.check()
             writer.finish("all stages are done")
+
+
+def write_bodies(
+    writer: ImpulseWriter, scenario: ImpulseScenario, frame: BodyFrame, row: Mapping[str, float] | None
+) -> None:
+    """Write what a frame of bodies is due for; `row` is the last row of the series."""
+    stage = scenario.stages[frame.stage]
+    if row and "series" in frame.due:
+        writer.append_series(row)
+    if frame.stage_start:
+        writer.begin_stage(stage.name, stage.kind, frame.time, row)
+    if "frames" in frame.due:
+        writer.append_frame(frame)
+    if "tracks" in frame.due:
+        writer.append_tracks(frame.time, frame.bodies)
+    for warning in frame.warnings:
+        writer.warn(warning)
+    if frame.stage_end and row:
+        writer.end_stage(frame.time, frame.stop_reason, row)
 
 
 def begin(

@@ -11,8 +11,8 @@ import tomli_w
 
 from dem_cli.assembly import Assembly
 from dem_cli.engines.explicit.lists import FINE
-from dem_cli.engines.explicit.motion import Ground, Still
 from dem_cli.engines.explicit.state import ExplicitState
+from dem_cli.engines.motion import Ground, Still
 from dem_cli.scenario import Scenario, parse_scenario
 from dem_cli.state import Bonds, Floats, Frame, Grains, Walls
 

@@ -26,8 +26,7 @@ from results_samples import (
 )
 
 from dem_cli.errors import ResultsError, RunError
-from dem_cli.results import open_results, partial_path
-from dem_cli.results import writer as writer_module
+from dem_cli.results import open_results, partial_path, run_file
 from dem_cli.results.schema import FORMAT_VERSION, SERIES
 
 
@@ -68,7 +67,7 @@ def test_an_exception_is_the_stop_reason(tmp_path: Path, error: BaseException, r
 
 
 def test_rows_appear_with_a_flush_and_not_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(writer_module, "FLUSH_SECONDS", 1e9)
+    monkeypatch.setattr(run_file, "FLUSH_SECONDS", 1e9)
 
     def seen() -> tuple[int, int, int]:
         with open_results(tmp_path / "out.partial.h5") as results:
@@ -82,11 +81,11 @@ def test_rows_appear_with_a_flush_and_not_before(tmp_path: Path, monkeypatch: py
         assert seen() == (0, 0, 0)
         writer.flush()
         assert seen() == (1, 1, 1)
-        monkeypatch.setattr(writer_module, "FLUSH_BYTES", 3 * 8 * len(SERIES))
+        monkeypatch.setattr(run_file, "FLUSH_BYTES", 3 * 8 * len(SERIES))
         for k in range(1, 4):
             writer.append_series(series_row(k), np.zeros(3))
         assert seen()[0] > 1
-        monkeypatch.setattr(writer_module, "FLUSH_SECONDS", 0.0)
+        monkeypatch.setattr(run_file, "FLUSH_SECONDS", 0.0)
         writer.append_series(series_row(4), np.zeros(3))
         assert seen() == (5, 1, 1)
 
@@ -213,8 +212,8 @@ def test_a_disk_that_is_nearly_full_stops_the_run_before_hdf5_fails(
     writer = open_writer(path)
     writer.append_series(series_row(0), np.zeros(3))
     writer.flush()
-    usage = writer_module.shutil.disk_usage(tmp_path)._replace(free=1000)
-    monkeypatch.setattr(writer_module.shutil, "disk_usage", lambda _: usage)
+    usage = run_file.shutil.disk_usage(tmp_path)._replace(free=1000)
+    monkeypatch.setattr(run_file.shutil, "disk_usage", lambda _: usage)
     with pytest.raises(RunError, match=r"out\.partial\.h5: cannot write \(No space left on device\)"):
         writer.append_frame(some_frame(0, PAIRS[0]), coordination(0), stress(0))
     writer.finish("too late")  # nothing more is written and nothing is raised

@@ -20,6 +20,7 @@ COMMANDS = {
     "report": "Print what a result file says; compare several.",
     "compare": "Compare runs side by side, and with the thesis; draw it.",
     "render": "Draw a picture from a result file.",
+    "export": "Write bodies in 3D for ParaView or as STL.",
     "schema": "Print the JSON Schema of scenario files, for editors.",
 }
 INTERRUPTED = 130

@@ -66,14 +66,18 @@ def command(
     import json
     import sys
 
+    from dem_cli.errors import ScenarioError
     from dem_cli.report.compare import compare
     from dem_cli.report.compare_figures import check_request, draw
     from dem_cli.report.compare_text import blocks
-    from dem_cli.report.kinds import axis_of
+    from dem_cli.report.kinds import kind_of
     from dem_cli.report.look import check_target, save, style
     from dem_cli.report.text import show
 
-    if axis_of(files) == "increment":
+    kind = kind_of(files)
+    if kind == "bodies":
+        raise ScenarioError("runs of bodies in 3D are compared by dem report FILE FILE ...: a row a file")
+    if kind == "increment":
         _shear_tests(
             files, each, as_json, output, what, stage, dpi, force, idle={"--thesis": with_thesis, "--grains": grains}
         )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-AT_ONE_FRAME = ("sample", "rose", "forces", "normals", "energy-normals")
+AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals")
 
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
@@ -17,19 +17,19 @@ AT_ONE_FRAME = ("sample", "rose", "forces", "normals", "energy-normals")
     "output",
     type=click.Path(path_type=Path),
     metavar="PICTURE",
-    help="PNG, SVG or PDF [default: FILE-WHAT.png].",
+    help="PNG, SVG or PDF, of scenes GIF too [default: FILE-WHAT.png].",
 )
 @click.option(
     "--what",
     metavar="KIND",
-    help="One of the kinds below [default: sample].",
+    help="One of the kinds below [default: sample, of bodies in 3D scene].",
 )
-@click.option("--time", type=float, metavar="T", help="Sample, rose: the frame nearest to T seconds.")
+@click.option("--time", type=float, metavar="T", help="Sample, rose, scene: the frame nearest to T seconds.")
 @click.option(
     "--frame",
     type=int,
     metavar="K",
-    help="Sample, rose, forces, normals: frame K from 0, or -1, -2, ... from the last.",
+    help="Sample, rose, scene, forces, normals: frame K from 0, or -1, -2, ... from the last.",
 )
 @click.option(
     "--increment",
@@ -41,11 +41,13 @@ AT_ONE_FRAME = ("sample", "rose", "forces", "normals", "energy-normals")
 @click.option(
     "--stage", type=int, metavar="N", help="Only stage N, from 1 (0: whole run); sample, rose: its last frame."
 )
-@click.option("--color", metavar="QUANTITY", help="Sample: what grains are coloured by [default: displacement].")
+@click.option(
+    "--color", metavar="QUANTITY", help="Sample, scene: what grains are coloured by [default: displacement; kind]."
+)
 @click.option(
     "--chains/--no-chains",
     default=None,
-    help="Sample: lines as wide as the normal force [default: if grains are large enough].",
+    help="Sample, scene: lines as wide as the normal force [default: if grains are large enough; none].",
 )
 @click.option(
     "--bonds/--no-bonds",
@@ -57,11 +59,12 @@ AT_ONE_FRAME = ("sample", "rose", "forces", "normals", "energy-normals")
     "--range",
     "limits",
     metavar="LOW,HIGH",
-    help="Sample, surface: limits of the colours, SI units.",
+    help="Sample, scene, surface: limits of the colours, SI units.",
 )
+@click.option("--view", metavar="AZIMUTH,ELEVATION", help="Scene: where it is seen from, degrees [default: -62,24].")
 @click.option("--series", metavar="NAME,...", help="Series to draw; implies --what series.")
 @click.option("--grains", metavar="ID,...", help="Histories, trajectories: only these tracked grains.")
-@click.option("--dpi", type=click.FloatRange(20, 1200), default=200.0, show_default=True, help="Resolution of PNG.")
+@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, GIF 80].")
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     file: Path,
@@ -77,9 +80,10 @@ def command(
     bonds: bool | None,
     marks: bool,
     limits: str | None,
+    view: str | None,
     series: str | None,
     grains: str | None,
-    dpi: float,
+    dpi: float | None,
     force: bool,
 ) -> None:
     """Draw a picture from a result FILE and print its name.
@@ -108,37 +112,49 @@ def command(
     ranked          contacts ranked by their share in chosen increments (17)
     paper           all of them on a page
 
-    They show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
+    \b
+    Of bodies in 3D, beside energy, series, histories and trajectories (in plan and section):
+    scene           bodies, planes and terrain, shaded; as a GIF (-o NAME.gif) all frames, or those of --stage
+    check           velocity over time beside the closed form that [output] check names
+    runout          how far bodies ran from where they started
+
+    Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
     normals show one frame with --increment, --frame or --last.
 
     QUANTITY is radius, id, body, aspect, orientation, speed, spin, displacement, displacement_x,
     displacement_y, rotation, coordination, pressure, shear_stress, stress_xx, stress_yy or stress_xy;
     displacement and rotation count from the start of the frame's stage. Grains of several discs have one
     displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only tells
-    grains apart. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
+    grains apart. Of scenes it is kind, id, speed, spin, kinetic, displacement, rotation, height, mass or
+    coordination. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.
     from dem_cli.errors import ScenarioError
+    from dem_cli.report import animation
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
+    from dem_cli.report.kinds import kind_of
     from dem_cli.report.look import check_target, save, style
-    from dem_cli.results import open_results
+    from dem_cli.results import BodyResults, open_results
 
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")
+    three = kind_of([file]) == "bodies" if file.is_file() else False
+    what = what or ("series" if series else "scene" if three else "sample")
     picture = Picture(
-        what=what or ("series" if series else "sample"),
+        what="scene" if three and what == "sample" else what,
         time=time,
         frame=-1 if last else frame,
         increment=increment,
         stage=stage,
-        color=color or "displacement",
+        color=color,
         chains=chains,
         bonds=bonds,
         marks=marks,
         limits=_pair(limits) if limits else None,
         series=[name.strip() for name in series.split(",")] if series else None,
         grains=_whole(grains) if grains else None,
+        view=_angles(view) if view else None,
     )
     check_request(picture)
     moment = frame is not None or last
@@ -153,15 +169,24 @@ def command(
         "--series": series,
         "--grains": grains,
         "--range": limits,
+        "--view": view,
     }
     _refuse_idle(picture.what, given)
     target = output or file.with_name(f"{file.stem}-{picture.what}.png")
-    check_target(target, force)
+    moving = target.suffix.lower() == animation.ENDING and picture.what == "scene"
+    if moving:
+        animation.check_gif(target, force)
+    else:
+        check_target(target, force)
     with open_results(file) as results:
         if not results.complete:
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
         with style():
-            save(draw(results, picture), target, dpi)
+            if moving and isinstance(results, BodyResults):
+                _refuse_moment(time is not None or moment)
+                animation.save_animation(results, picture, target, dpi or 80.0)
+            else:
+                save(draw(results, picture), target, dpi or 200.0)
         if increment is not None:
             shown = float(results.frame_times[choose_frame(results, picture)])
             asked = increment + (results.stages[stage - 1].start if stage else 0.0)
@@ -179,16 +204,17 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
     from dem_cli.errors import ScenarioError
 
     kinds = {
-        "--time": ("sample", "rose"),
+        "--time": ("sample", "scene", "rose"),
         "--frame/--last": AT_ONE_FRAME,
         "--increment": AT_ONE_FRAME,
-        "--color": ("sample",),
-        "--chains/--no-chains": ("sample",),
+        "--color": ("sample", "scene"),
+        "--chains/--no-chains": ("sample", "scene"),
         "--bonds/--no-bonds": ("sample",),
         "--marks": ("sample",),
         "--series": ("series",),
         "--grains": ("histories", "trajectories"),
-        "--range": ("sample", "surface"),
+        "--range": ("sample", "scene", "surface"),
+        "--view": ("scene",),
     }
     for option, value in given.items():
         names = (
@@ -196,6 +222,29 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
         )
         if value and what not in kinds[option]:
             raise ScenarioError(f"{option} has no meaning for --what {what}, only for {names}")
+
+
+def _refuse_moment(given: bool) -> None:
+    from dem_cli.errors import ScenarioError
+
+    if given:
+        raise ScenarioError(
+            "an animation shows all frames, or those of --stage; --time, --frame and --last choose one for a picture"
+        )
+
+
+def _angles(text: str) -> tuple[float, float]:
+    from dem_cli.errors import ScenarioError
+
+    try:
+        azimuth, elevation = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ScenarioError(
+            f'--view "{text}": write azimuth and elevation in degrees, for example --view -62,24'
+        ) from None
+    if not -90.0 <= elevation <= 90.0:
+        raise ScenarioError(f"--view {text}: the elevation lies between -90 and 90 degrees")
+    return azimuth, elevation
 
 
 def _pair(text: str) -> tuple[float, float]:

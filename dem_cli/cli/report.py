@@ -23,26 +23,32 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
 
     One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
     quasi-static shear test the turn of the volume change, peak and residual state, energies, events and
-    iterations. Several FILEs: one table to compare them, a row a file; shear tests that differ in their seed only
+    iterations; of bodies in 3D the solver's work, the closed form that [output] check names, and the run-out.
+    Several FILEs: one table to compare them, a row a file; shear tests that differ in their seed only
     get a row of their mean. --json prints an object for one FILE and a list for several; its keys are those of
-    the dataclasses in dem_cli/report/summary.py, of shear tests shear.py. --csv writes series.csv, stages.csv,
-    surface.csv (shear tests: dissipation.csv) and tracks.csv; with several FILEs into one folder a file below DIR.
+    the dataclasses in dem_cli/report/summary.py, of shear tests shear.py, of bodies impulse.py. --csv writes
+    series.csv, stages.csv, surface.csv (shear tests: dissipation.csv; bodies: check.csv, runout.csv) and
+    tracks.csv; with several FILEs into one folder a file below DIR.
     """
     # Imported here so that `dem --help` stays quick.
     import json
     import sys
 
-    from dem_cli.report import export, shear, shear_text, summary, text
-    from dem_cli.report.kinds import axis_of
-    from dem_cli.results import open_results
+    from dem_cli.report import export, impulse, impulse_csv, impulse_text, shear, shear_text, summary, text
+    from dem_cli.report.kinds import kind_of
+    from dem_cli.results import BodyResults, open_results
 
-    over_time = axis_of(files) == "time"
+    kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
-    runs, tests = [], []
+    runs, tests, bodies = [], [], []
     for path, place in zip(files, places, strict=True):
         with open_results(path) as results:
             tables: list[Path] = []
-            if over_time:
+            if isinstance(results, BodyResults):
+                bodies.append(impulse.body_summary(results))
+                if place is not None:
+                    tables = impulse_csv.export_body_csv(results, bodies[-1], place, force)
+            elif kind == "time":
                 runs.append(summary.summary(results))
                 if place is not None:
                     tables = export.export_csv(results, runs[-1], place, force)
@@ -53,9 +59,16 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
             for table in tables:
                 click.echo(f"wrote {table}", err=True)
     if as_json:
-        trees = [*(one.as_dict() for one in runs), *(one.as_dict() for one in tests)]
+        trees = [
+            *(one.as_dict() for one in runs),
+            *(one.as_dict() for one in tests),
+            *(one.as_dict() for one in bodies),
+        ]
         click.echo(json.dumps(trees[0] if len(trees) == 1 else trees, indent=2, ensure_ascii=False, allow_nan=False))
-    elif over_time:
+    elif kind == "time":
         text.show(text.blocks(runs[0]) if len(runs) == 1 else [text.comparison(runs)], sys.stdout)
+    elif kind == "bodies":
+        found = impulse_text.blocks(bodies[0]) if len(bodies) == 1 else [impulse_text.comparison(bodies)]
+        text.show(found, sys.stdout)
     else:
         text.show(shear_text.blocks(tests[0]) if len(tests) == 1 else [shear_text.comparison(tests)], sys.stdout)

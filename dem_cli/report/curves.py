@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,6 +46,19 @@ LOST = {
 }
 
 
+@dataclass(frozen=True)
+class Ledger:
+    """What is stored and lost: series -> (label, colour), from the bottom up; given: series that the stack must follow, and their label."""
+
+    stored: Mapping[str, tuple[str, str]]
+    lost: Mapping[str, tuple[str, str]]
+    given: tuple[str, ...]
+    label: str
+
+
+LEDGER = Ledger(STORED, LOST, ("work", "time_step_energy"), "start + work + time step")
+
+
 def _inside(time: Floats, window: Window) -> Bools:
     return np.asarray((time >= window[0] - 1e-9) & (time <= window[1] + 1e-9))
 
@@ -67,7 +81,7 @@ def draw_series(results: Results, names: Sequence[str], window: Window, text: st
     return figure
 
 
-def draw_energy(results: Results, window: Window, text: str) -> Figure:
+def draw_energy(results: Results, window: Window, text: str, ledger: Ledger = LEDGER) -> Figure:
     """Stored and lost energy since the start of the window, stacked; the line is what the stack must reach:
     the start, plus work, plus time-step error.
     """
@@ -79,15 +93,17 @@ def draw_energy(results: Results, window: Window, text: str) -> Figure:
         return np.nan_to_num(np.asarray(results.series[name])[inside])
 
     time = column("time")
-    parts = {name: column(name) for name in STORED} | {name: column(name) - column(name)[0] for name in LOST}
+    parts = {name: column(name) for name in ledger.stored} | {
+        name: column(name) - column(name)[0] for name in ledger.lost
+    }
     parts["potential"] = parts["potential"] - parts["potential"].min()
-    given = column("work") + column("time_step_energy")
+    given = np.sum([column(name) for name in ledger.given], axis=0)
     must = sum(parts[name][0] for name in parts) + given - given[0]
     factor, unit = display_unit("J", largest(must))
     figure = new_figure(7.5, 5.4)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(4, 1))
-    kept = [name for name in (*STORED, *LOST) if parts[name].max() > 0.0]
-    looks = {**STORED, **LOST}
+    kept = [name for name in parts if parts[name].max() > 0.0]
+    looks = {**ledger.stored, **ledger.lost}
     areas = upper.stackplot(
         time,
         *[parts[name] / factor for name in kept],
@@ -96,7 +112,7 @@ def draw_energy(results: Results, window: Window, text: str) -> Figure:
         edgecolor="white",
         linewidth=0.3,
     )
-    line = upper.plot(time, must / factor, color="black", lw=1.0, ls=(0, (4, 2)), label="start + work + time step")
+    line = upper.plot(time, must / factor, color="black", lw=1.0, ls=(0, (4, 2)), label=ledger.label)
     upper.set_ylabel(axis_label("energy", unit))
     upper.set_ylim(bottom=0.0)
     upper.legend(handles=[*line, *reversed(areas)], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8)

@@ -15,7 +15,7 @@ from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.shear import STATE, ShearSummary
 from dem_cli.report.summary import MEASURES, Summary
 from dem_cli.results import Results
-from dem_cli.results.schema import INCREMENTS, SERIES, TRACKS
+from dem_cli.results.schema import INCREMENTS, SERIES
 
 Row = Sequence[object]
 
@@ -43,28 +43,28 @@ def export_csv(results: Results, summary: Summary, folder: Path, force: bool = F
     files exists and `force` is not set; then nothing is written.
     """
     tables = {
-        "series.csv": _series(results),
+        "series.csv": series_table(results),
         "stages.csv": _stages(summary),
         "surface.csv": _surface(results),
     }
     if results.tracks is not None:
-        tables["tracks.csv"] = _tracks(results)
-    return _write(tables, folder, force)
+        tables["tracks.csv"] = tracks_table(results)
+    return write_tables(tables, folder, force)
 
 
 def export_shear_csv(results: Results, summary: ShearSummary, folder: Path, force: bool = False) -> list[Path]:
     """The same for a quasi-static test: series.csv has a row an increment, dissipation.csv a row an increment and rank."""
     tables = {
-        "series.csv": _series(results),
+        "series.csv": series_table(results),
         "stages.csv": _shear_stages(summary),
         "dissipation.csv": _dissipation(results),
     }
     if results.tracks is not None:
-        tables["tracks.csv"] = _tracks(results)
-    return _write(tables, folder, force)
+        tables["tracks.csv"] = tracks_table(results)
+    return write_tables(tables, folder, force)
 
 
-def _write(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool) -> list[Path]:
+def write_tables(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool) -> list[Path]:
     paths = {name: folder / name for name in tables}
     there = [str(path) for path in paths.values() if path.exists()]
     if there and not force:
@@ -79,16 +79,16 @@ def _write(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool) -> li
     return list(paths.values())
 
 
-def _series(results: Results) -> Iterator[Row]:
+def series_table(results: Results) -> Iterator[Row]:
     names = list(results.series)
     if results.axis not in names:
         names.insert(0, results.axis)
-    yield [_head(name, results.series.unit(name)) for name in names]
+    yield [head(name, results.series.unit(name)) for name in names]
     yield from zip(*(np.asarray(results.series[name]).tolist() for name in names), strict=True)
 
 
 def _stages(summary: Summary) -> Iterator[Row]:
-    measures = [_head(f"{name} {when}", SERIES[name][0]) for when in ("before", "after") for name in MEASURES]
+    measures = [head(f"{name} {when}", SERIES[name][0]) for when in ("before", "after") for name in MEASURES]
     yield [
         "stage",
         "name",
@@ -107,7 +107,7 @@ def _stages(summary: Summary) -> Iterator[Row]:
 
 def _shear_stages(summary: ShearSummary) -> Iterator[Row]:
     """State at both ends, and what the stage did: numbers of `shear.StageReport` in SI units."""
-    states = [_head(f"{name} {when}", INCREMENTS[name][0]) for when in ("before", "after") for name in STATE]
+    states = [head(f"{name} {when}", INCREMENTS[name][0]) for when in ("before", "after") for name in STATE]
     points = [
         f"{name} {what}"
         for what in ("turn", "peak", "end")
@@ -165,15 +165,16 @@ def _surface(results: Results) -> Iterator[Row]:
         yield from zip([time] * len(x), x, eta, strict=True)
 
 
-def _tracks(results: Results) -> Iterator[Row]:
+def tracks_table(results: Results) -> Iterator[Row]:
     tracks = results.tracks
     if tracks is None:
         return
-    names = [name for name in TRACKS if name in tracks.arrays]
+    units = results.layout.tracks
+    names = [name for name in units if name in tracks.arrays]
     yield [
         "time [s]" if results.axis == "time" else "increment",
         "grain",
-        *(_head(name, TRACKS[name][0]) for name in names),
+        *(head(name, units[name][0]) for name in names),
     ]
     ids: Iterable[int] = np.asarray(tracks.ids).tolist()
     columns = [np.asarray(tracks.arrays[name]) for name in names]
@@ -181,5 +182,5 @@ def _tracks(results: Results) -> Iterator[Row]:
         yield from zip([time] * len(tracks.ids), ids, *(column[k].tolist() for column in columns), strict=True)
 
 
-def _head(name: str, unit: str) -> str:
+def head(name: str, unit: str) -> str:
     return name if unit in ("", "1") else f"{name} [{unit}]"

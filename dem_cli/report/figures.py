@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.look import stage_label
-from dem_cli.results import Results
+from dem_cli.results import BodyResults, Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,6 +22,8 @@ SHEAR_KINDS = (
     "stress-strain", "forces", "normals", "energy-normals", "coordination", "energy-tensor", "dissipation", "largest-share",
     "ranked", "paper",
 )  # fmt: skip
+# Of bodies in 3D, beside energy and series.
+BODY_KINDS = ("scene", "check", "runout", "trajectories", "histories")
 OVER_TIME = ("surface", "energy", "motion")  # kinds that a quasi-static test has not
 DEFAULT_SERIES = ("void_ratio", "depth", "coordination", "kinetic")
 INCREMENT_SERIES = ("stress_ratio", "volumetric_strain", "void_ratio", "coordination")
@@ -33,7 +35,7 @@ class Picture:
 
     time [s], frame (0-based, negative from the end), increment (of the run, or of the stage that is asked for), stage (1-based, 0 is
     the whole run), color: a quantity of a grain, chains, bonds, marks: what is drawn over the grains, limits of the colours, series:
-    names, grains: numbers of tracked grains.
+    names, grains: numbers of tracked grains. view: azimuth and elevation [deg] of the camera on bodies in 3D, of which "sample" is the scene.
     """
 
     what: str = "sample"
@@ -41,13 +43,14 @@ class Picture:
     frame: int | None = None
     increment: int | None = None
     stage: int | None = None
-    color: str = "displacement"
+    color: str | None = None
     chains: bool | None = None
     bonds: bool | None = None
     marks: bool = False
     limits: tuple[float, float] | None = None
     series: Sequence[str] | None = None
     grains: Sequence[int] | None = None
+    view: tuple[float, float] | None = None
 
 
 def draw(results: Results, picture: Picture) -> Figure:
@@ -58,6 +61,11 @@ def draw(results: Results, picture: Picture) -> Figure:
     from dem_cli.report import curves, motions, rose, sample, tracked
 
     check_request(picture)
+    if isinstance(results, BodyResults):
+        from dem_cli.report import impulse_figures
+
+        _check_stage(results, picture)
+        return impulse_figures.draw_bodies(results, picture)
     _check_file(results, picture)
     if picture.what in SHEAR_KINDS:
         return _draw_shear(results, picture)
@@ -65,7 +73,7 @@ def draw(results: Results, picture: Picture) -> Figure:
         return sample.draw_sample(
             results,
             choose_frame(results, picture),
-            color=picture.color,
+            color=picture.color or "displacement",
             chains=picture.chains,
             bonds=picture.bonds,
             marks=picture.marks,
@@ -185,18 +193,29 @@ def check_request(picture: Picture) -> None:
     """Raise ScenarioError for what no file could give: an unknown kind of picture or quantity, colour limits
     upside down.
     """
+    from dem_cli.report.body_quantities import BODY_QUANTITIES
     from dem_cli.report.quantities import QUANTITIES
 
-    if picture.what not in (*KINDS, *SHEAR_KINDS):
-        raise ScenarioError(unknown("kind of picture", picture.what, (*KINDS, *SHEAR_KINDS)))
-    if picture.what == "sample" and picture.color not in QUANTITIES:
-        raise ScenarioError(unknown("quantity of a grain", picture.color, QUANTITIES))
+    known = tuple(dict.fromkeys((*KINDS, *SHEAR_KINDS, *BODY_KINDS)))
+    if picture.what not in known:
+        raise ScenarioError(unknown("kind of picture", picture.what, known))
+    if picture.color is not None and picture.color not in {**QUANTITIES, **BODY_QUANTITIES}:
+        name = "quantity of a body" if picture.what == "scene" else "quantity of a grain"
+        raise ScenarioError(unknown(name, picture.color, BODY_QUANTITIES if picture.what == "scene" else QUANTITIES))
     if picture.limits is not None and not picture.limits[1] > picture.limits[0]:
         low, high = picture.limits
         raise ScenarioError(f"--range {low:g},{high:g}: the second number must be the larger")
 
 
 def _check_file(results: Results, picture: Picture) -> None:
+    from dem_cli.report.quantities import QUANTITIES
+
+    if picture.what in BODY_KINDS and picture.what not in KINDS:
+        raise ScenarioError(
+            f"{results.path}: --what {picture.what} shows bodies in 3D, these are grains in 2D; choose from {', '.join(KINDS)}"
+        )
+    if picture.what == "sample" and picture.color is not None and picture.color not in QUANTITIES:
+        raise ScenarioError(f"{results.path}: " + unknown("quantity of a grain", picture.color, QUANTITIES))
     if results.axis == "increment":
         _check_increments(results, picture)
     elif picture.what in SHEAR_KINDS:
@@ -209,6 +228,11 @@ def _check_file(results: Results, picture: Picture) -> None:
         for name in series_of(results, picture):
             if name not in results.series:
                 raise ScenarioError(f"{results.path}: " + unknown("series", name, results.series))
+    _check_stage(results, picture)
+
+
+def _check_stage(results: Results, picture: Picture) -> None:
+    """Raise ScenarioError for a stage that the run has not."""
     if picture.stage is not None and not 0 <= picture.stage <= len(results.stages):
         count = len(results.stages)
         raise ScenarioError(

@@ -167,7 +167,9 @@ def _draw_grains(
     if quantity.kind == "label":
         values = finite = values % len(PALETTE)
     scale, unit = display_unit(quantity.unit, largest(finite) if limits is None else largest(np.array(limits)))
-    norm, cmap, extend = _colors(finite / scale, quantity.kind, None if limits is None else np.array(limits) / scale)
+    norm, cmap, extend = value_colors(
+        finite / scale, quantity.kind, None if limits is None else np.array(limits) / scale
+    )
     if undefined is not None:
         cmap = cmap.with_extremes(bad=undefined)
     edges = grains.grain_count <= MOST_EDGES
@@ -203,7 +205,7 @@ def _draw_grains(
         bar.set_ticks(list(range(low, high + 1, max(1, (high - low) // 8))))
 
 
-def _colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize, Colormap, Extend]:
+def value_colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Normalize, Colormap, Extend]:
     """Norm, colour map and arrows of the colour bar. Long tails are cut at the 99.5th percentile, shown by an
     arrow.
     """

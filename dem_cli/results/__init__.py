@@ -1,5 +1,8 @@
 """Result files: names and units (`schema`), the writer and the reader."""
 
+from dem_cli.results.body_frames import StoredBodyFrame
+from dem_cli.results.body_reader import BodyResults
+from dem_cli.results.body_writer import ImpulseWriter
 from dem_cli.results.dissipation import Dissipation
 from dem_cli.results.files import partial_path
 from dem_cli.results.frames import StoredFrame, StoredIncrement
@@ -9,10 +12,13 @@ from dem_cli.results.stages import Stage
 from dem_cli.results.writer import ResultWriter
 
 __all__ = [
+    "BodyResults",
     "Dissipation",
+    "ImpulseWriter",
     "ResultWriter",
     "Results",
     "Stage",
+    "StoredBodyFrame",
     "StoredFrame",
     "StoredIncrement",
     "StoredMotion",

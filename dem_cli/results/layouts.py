@@ -1,24 +1,29 @@
-"""What a result file holds for which engine: runs over time and quasi-static tests over increments share all but these tables."""
+"""What a result file holds for which engine: runs over time, quasi-static tests and bodies in 3D share all but these tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
+from dem_cli.results.body_schema import BODY_FRAMES, BODY_SERIES, BODY_TRACKS
 from dem_cli.results.schema import FRAMES, INCREMENT_FRAMES, INCREMENTS, SERIES, STAGES, TRACKS
 from dem_cli.results.tables import INCREMENT, TIME, Axis
 
 Columns = Mapping[str, tuple[str, str]]
+Kind = Literal["time", "increment", "bodies"]
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The parts of a result file that depend on what is counted along its axis.
+    """The parts of a result file that depend on what is counted along its axis, and on what moves.
 
-    axis: of /series, /tracks, /frames and `Steps/Values`. version: of the format that such files are written in. series, frames, tracks, stages:
-    name -> (unit, definition). surface, dissipation: whether there are such groups. moving: walls are written with every frame.
+    kind: "time" (grains in 2D over time), "increment" (quasi-static tests) or "bodies" (in 3D, over time). axis: of /series, /tracks,
+    /frames and `Steps/Values`. version: of the format that such files are written in. series, frames, tracks, stages: name ->
+    (unit, definition). surface, dissipation: whether there are such groups. moving: walls are written with every frame.
     """
 
+    kind: Kind
     axis: Axis
     version: int
     series: Columns
@@ -36,6 +41,7 @@ class Layout:
 
 
 OVER_TIME = Layout(
+    kind="time",
     axis=TIME,
     version=2,
     series=SERIES,
@@ -47,6 +53,7 @@ OVER_TIME = Layout(
     moving=False,
 )
 OVER_INCREMENTS = Layout(
+    kind="increment",
     axis=INCREMENT,
     version=3,
     series=INCREMENTS,
@@ -64,11 +71,31 @@ OVER_INCREMENTS = Layout(
 )
 
 
+IMPULSE = Layout(
+    kind="bodies",
+    axis=TIME,
+    version=4,
+    series=BODY_SERIES,
+    frames=BODY_FRAMES,
+    tracks=BODY_TRACKS,
+    stages=STAGES,
+    surface=False,
+    dissipation=False,
+    moving=False,
+)
+ENGINES = {"granular-element": OVER_INCREMENTS, "impulse": IMPULSE}
+
+
 def layout_of(engine: str) -> Layout:
     """The layout of an engine's result files."""
-    return OVER_INCREMENTS if engine == "granular-element" else OVER_TIME
+    return ENGINES.get(engine, OVER_TIME)
 
 
-def layout_over(axis: str) -> Layout:
-    """The layout of a file by its attribute `axis`; KeyError for one that is unknown."""
-    return {layout.axis.name: layout for layout in (OVER_TIME, OVER_INCREMENTS)}[axis]
+def layout_in(attributes: Mapping[str, object]) -> Layout:
+    """The layout of a file by the attributes of its root; KeyError for one that is unknown.
+
+    Files of format 1 and early ones of 2 do not tell their axis. That of the impulse engine's is time too, so its name decides.
+    """
+    if attributes.get("engine") == "impulse":
+        return IMPULSE
+    return {layout.axis.name: layout for layout in (OVER_TIME, OVER_INCREMENTS)}[str(attributes.get("axis", "time"))]

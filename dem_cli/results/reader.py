@@ -19,7 +19,7 @@ from dem_cli.results.bonds import read_bonds, read_strain
 from dem_cli.results.dissipation import Dissipation, read_dissipation, read_slips
 from dem_cli.results.files import partial_path
 from dem_cli.results.frames import StoredFrame, StoredIncrement, stored_frame, stored_increment
-from dem_cli.results.layouts import Layout, layout_over
+from dem_cli.results.layouts import Layout, layout_in
 from dem_cli.results.motions import StoredMotion, read_motions
 from dem_cli.results.schema import FORMAT, FORMAT_VERSION, KIND_CONTACT, KIND_WALL_CONTACT
 from dem_cli.results.stages import Stage, read_stages
@@ -80,13 +80,14 @@ class Results:
         self.attrs: dict[str, Any] = {name: _plain(value) for name, value in file.attrs.items()}
         self.complete = bool(self.attrs["complete"])
         self.title = str(self.attrs["title"])
-        self.depth = float(self.attrs["depth"])
-        self.width = float(self.attrs["width"])
+        self.depth = float(self.attrs.get("depth", math.nan))  # bodies in 3D have none
+        self.width = float(self.attrs["width"])  # NaN without a container
         height = float(self.attrs["height"])
         self.height = None if math.isnan(height) else height  # None: walls without end
         self.grain_count = int(self.attrs["grains"])
         self.element_count = int(self.attrs.get("elements", self.grain_count))  # format 1 knew discs only
-        self.layout = layout_over(self.attrs.get("axis", "time"))  # files of format 1 and early ones of 2 do not tell
+        self.layout = layout_in(self.attrs)
+        self.kind = self.layout.kind  # "time", "increment" or "bodies"
         self.axis = self.layout.axis.name  # "time" or "increment"
         self.boundary = int(self.attrs.get("boundary", 0))  # grains of the boundary, the last of the elements
         self.series = Series(file["series"], self.layout)
@@ -141,7 +142,7 @@ class Results:
     def surface(self) -> Surface:
         """ResultsError in files of quasi-static tests, which have none."""
         if not self.layout.surface:
-            raise ResultsError(f"{self.path}: a quasi-static test has no free surface")
+            raise ResultsError(f"{self.path}: has no free surface, only runs over time of grains in 2D do")
         group = self._file["surface"]
         rows = int(group.attrs["rows"])
         return Surface(np.asarray(group["x"][:]), np.asarray(group["time"][:rows]), np.asarray(group["eta"][:rows]))
@@ -254,7 +255,10 @@ class Results:
 
 
 def open_results(path: Path | str) -> Results:
-    """Open a result file, also one that is still being written. ResultsError, in one line, if it is none that can be read."""
+    """Open a result file, also one that is still being written: a BodyResults if it is of the impulse engine.
+
+    ResultsError, in one line, if it is none that can be read.
+    """
     path = Path(path)
     if not path.is_file():
         partial = partial_path(path) if path.name else path
@@ -263,6 +267,10 @@ def open_results(path: Path | str) -> Results:
     file = _open(path)
     try:
         _check_format(path, file)
+        if file.attrs["engine"] == "impulse":
+            from dem_cli.results.body_reader import BodyResults
+
+            return BodyResults(path, file)
         return Results(path, file)
     except ResultsError:
         file.close()

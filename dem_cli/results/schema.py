@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 FORMAT = "dem-cli results"
 # 1: discs only; no semi-axes, bodies or bonds, and `grains` counts what `elements` counts now. 2: runs over time. 3: the layout of runs over
-# increments came along; runs over time are written as 2 still.
-FORMAT_VERSION = 3
+# increments came along; runs over time are written as 2 still. 4: the layout of bodies in 3D (`body_schema`) came along; the others stay.
+FORMAT_VERSION = 4
 
 # Series over time: name -> (unit, definition). The writer stores both as attributes of the dataset.
 SERIES: dict[str, tuple[str, str]] = {

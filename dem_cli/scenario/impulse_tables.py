@@ -37,7 +37,7 @@ METHODS_OF = {
     "stage": ("file",),
 }
 KISHINO = ("alpha", "alpha_prime", "beta", "beta_prime")
-OF_ENERGY_TRACKING = {"quanta": 50, "iterations": 20000}
+OF_ENERGY_TRACKING = {"quanta": 50, "iterations": 100000}
 
 
 class Pair(Table):
@@ -287,11 +287,15 @@ class ImpulseSolver(Table):
     )
     iterations: Annotated[int, Whole(ge=1)] | None = key(
         maker=_only_tracking("iterations"),
-        doc="energy-tracking: steps at most in one solve (default: 20000)",
-        example=20000,
+        doc="energy-tracking: steps at most in one solve (default: 100000)",
+        example=100000,
     )
-    sweeps: Annotated[int, Whole(ge=1)] = key(200, "sweeps at most in one solve", example=200)
-    tolerance: Positive = key("1e-5 m/s", "a solve ends when no contact's velocity changes by more", example="1e-5 m/s")
+    sweeps: Annotated[int, Whole(ge=1)] = key(5000, "sweeps at most in one solve", example=5000)
+    tolerance: Positive = key(
+        "1e-4 m/s",
+        "change of the contacts' velocities in a sweep, root mean square, at which a solve ends; few contacts are solved to rounding",
+        example="1e-4 m/s",
+    )
     rest_speed: Positive = key("1 mm/s", "contacts that approach more slowly are no impact", example="1 mm/s")
     correction: Annotated[float, Number(ge=0.0, le=1.0)] = key(
         0.2, "share of a penetration that is taken back in a step", example=0.2

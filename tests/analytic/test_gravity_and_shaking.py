@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from few_grains import KN, MASS, RADIUS, G, few_grains, floor, run_for, scenario, series, times
 
-from dem_cli.engines.explicit.motion import SineShaking, Still, gravity_of
+from dem_cli.engines.motion import SineShaking, Still, gravity_of
 from dem_cli.scenario import Shake
 
 AMPLITUDE, FREQUENCY = 4.0, 10.0  # 400 gal, 10 Hz

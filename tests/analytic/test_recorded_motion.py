@@ -11,7 +11,7 @@ from few_grains import KN, MASS, RADIUS, G, few_grains, floor, run_for, series, 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dem_cli.engines.explicit.motion import Recorded, SineShaking, Still, ground_of
+from dem_cli.engines.motion import Recorded, SineShaking, Still, ground_of
 from dem_cli.scenario import Run, Shake
 
 STEP = 0.01

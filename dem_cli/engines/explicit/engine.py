@@ -11,10 +11,10 @@ import numpy as np
 from dem_cli.assembly import Assembly
 from dem_cli.engines.explicit.checks import Watch, blown_up
 from dem_cli.engines.explicit.lists import FINE
-from dem_cli.engines.explicit.motion import Ground, gravity_of, ground_of
-from dem_cli.engines.explicit.schedule import Schedule
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.engines.explicit.timestep import choose_time_step
+from dem_cli.engines.motion import Ground, gravity_of, ground_of
+from dem_cli.engines.schedule import Schedule
 from dem_cli.scenario import Run, Scenario, Settle, Shake
 from dem_cli.state import Frame
 

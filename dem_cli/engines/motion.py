@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from dem_cli.scenario import Run, Scenario, Settle, Shake
+from dem_cli.scenario import ImpulseSettle, Run, Scenario, Settle, Shake
 from dem_cli.scenario.motion_facts import integrals
 from dem_cli.state import Bools, Floats, Ints
 
@@ -158,7 +158,7 @@ class Recorded:
         return np.array([x, v, acceleration])
 
 
-def ground_of(stage: Settle | Shake | Run) -> Ground:
+def ground_of(stage: Settle | ImpulseSettle | Shake | Run) -> Ground:
     """What the container does in a stage."""
     if not isinstance(stage, Shake):
         return Still()

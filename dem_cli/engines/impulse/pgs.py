@@ -1,0 +1,120 @@
+"""Projected Gauss-Seidel: impulses of all contacts of an island that touch at once, one contact after the other until nothing changes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from dem_cli.engines.impulse.rows import (
+    FRICTION,
+    INVERSE,
+    MATRIX,
+    NORMAL,
+    STIFF,
+    STIFF_ACROSS,
+    TARGET,
+    push,
+    relative,
+    symmetric,
+    vector,
+)
+from dem_cli.engines.impulse.symmetric import symmetric_times
+from dem_cli.engines.impulse.vectors import dot, plus, scaled
+from dem_cli.jit import kernel
+
+# Islands of so few contacts are solved to this share of the tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
+SMALL, FINE, FINE_SWEEPS = 64, 1e-7, 500
+ENOUGH = 1e-2  # of the first change: larger islands are not solved to less
+
+
+@kernel(inline=True)
+def aim_of(contacts, tolerance):
+    """The change of velocity [m/s] at which the solution of an island ends; one that ends below `tolerance` hit no cap either way."""
+    return tolerance * FINE if contacts <= SMALL else tolerance
+
+
+@kernel(inline=True)
+def new_impulse(row, old, u):
+    """The impulse [N s] of one contact that, with all others as they are, lets its bodies neither approach nor slide; or with
+    sliding, the impulse on the friction cone. old: the present one, u: relative velocity with it.
+
+    Sticking: J = J_old - K^-1 (u - target n), if J.n >= 0 and |J_t| <= mu J.n. Else J_n = max(0, J_n,old - (u.n - target)/(n.K.n)),
+    and J_t follows the slip, to the edge of the cone at most.
+    """
+    n, mu = vector(row, NORMAL), row[FRICTION]
+    away = dot(u, n) - row[TARGET]
+    before = dot(old, n)
+    if mu > 0.0:
+        still = plus(old, -1.0, symmetric_times(symmetric(row, INVERSE), plus(u, -row[TARGET], n)))
+        along = dot(still, n)
+        if along >= 0.0 and dot(still, still) - along * along <= mu * mu * along * along:
+            return still
+    along = max(0.0, before - away / row[STIFF])
+    if mu <= 0.0:
+        return scaled(along, n)
+    moved = plus(u, along - before, symmetric_times(symmetric(row, MATRIX), n))
+    slip = plus(moved, -dot(moved, n), n)
+    shear = plus(plus(old, -before, n), -1.0 / row[STIFF_ACROSS], slip)
+    size, most = math.sqrt(dot(shear, shear)), mu * along
+    return plus(scaled(along, n), most / size if size > most else 1.0, shear)
+
+
+@kernel(inline=True)
+def sweep(first, last, backwards, i, j, rows, velocity, inverse, impulse, change):
+    """One sweep over the contacts first..last - 1; returns the sum of the squared changes of their velocities [m^2/s^2], and that of the
+    energies dJ.K.dJ [J] that the changes dJ stand for.
+
+    change (contacts, 3) [N s]: by how much each impulse has changed.
+    """
+    speeds, energies = 0.0, 0.0
+    for k in range(last - first):
+        c = last - 1 - k if backwards else first + k
+        row, of_i, of_j = rows[c], velocity[i[c]], velocity[j[c]]
+        old = vector(impulse[c], 0)
+        new = new_impulse(row, old, relative(row, of_i, of_j))
+        step = plus(new, -1.0, old)
+        push(row, step, of_i, of_j, inverse[i[c]], inverse[j[c]])
+        for axis in range(3):
+            impulse[c, axis] = new[axis]
+            change[c - first, axis] = step[axis]
+        energy = dot(step, step) * row[STIFF]
+        energies += energy
+        speeds += energy * row[STIFF]
+    return speeds, energies
+
+
+@kernel()
+def sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, tolerance, most):
+    """Solves the contacts first..last - 1 of an island; returns sweeps done, the change of velocity [m/s] in the last one, root mean square,
+    and whether that is enough.
+
+    impulse (c, 3) [N s], taken as applied already, and velocity (n + 1, 6) are changed in place. Ends once the change is below `tolerance`
+    [m/s] or, in larger islands, a hundredth of the first one (small ones: `aim_of`), or after `most` sweeps, which go to and fro, so that no
+    contact is always first. What a sweep changes is taken for the
+    gradient of a nonlinear conjugate gradient method (Silcowitz-Hansen, Niebe and Erleben 2010): a share of the last direction is added
+    after it, unless changes grow. The last sweep ends on the cones.
+    """
+    contacts = last - first
+    aim, before, residual = aim_of(contacts, tolerance), 0.0, 0.0
+    change, direction = np.empty((contacts, 3)), np.zeros((contacts, 3))
+    for number in range(most):
+        speeds, energies = sweep(first, last, number % 2 == 1, i, j, rows, velocity, inverse, impulse, change)
+        residual = math.sqrt(speeds / contacts)
+        if number == 0 and contacts > SMALL:
+            aim = max(aim, ENOUGH * residual)
+        if residual <= aim or (number + 1 >= FINE_SWEEPS and residual <= tolerance):
+            return number + 1, residual, True
+        share = energies / before if before > 0.0 else 2.0
+        before = energies
+        if share > 1.0:
+            direction[:] = change
+        elif number + 1 < most:
+            for k in range(contacts):
+                c = first + k
+                more = scaled(share, vector(direction[k], 0))
+                push(rows[c], more, velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
+                for axis in range(3):
+                    impulse[c, axis] += more[axis]
+                    direction[k, axis] = more[axis] + change[k, axis]
+    return most, residual, residual <= tolerance
