@@ -60,7 +60,7 @@ def test_steps_of_a_given_time_step(tmp_path: Path) -> None:
 
 
 def test_lines(tmp_path: Path) -> None:
-    said = lines(tmp_path, drop({"grains.face_points": 3}))
+    said = lines(tmp_path, drop({"grains.face_points": 3, "solver": {"sweeps": 200, "tolerance": "1e-5 m/s"}}))
     assert said["bodies"] == "1 body, total mass 8000 kg"
     assert said["box"] == "1 x box of 8 corners, 12 triangles, 54 points on faces, material box"
     assert said["size"] == "radius of the bounding sphere 1.5 m"
