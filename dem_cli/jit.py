@@ -32,13 +32,19 @@ CACHE_FOLDER = Path(os.environ.get("NUMBA_CACHE_DIR") or _cache_folder())
 numba.config.CACHE_DIR = str(CACHE_FOLDER)  # type: ignore[attr-defined]
 
 
-def kernel(*, inline: bool = False) -> Callable[[Callable[..., Any]], Any]:
+def kernel(*, inline: bool = False, inner: bool = False) -> Callable[[Callable[..., Any]], Any]:
     """Decorator of every compiled function: cached, IEEE arithmetic save that a*b + c may be fused.
 
     inline: merge the machine code into its callers (small functions of inner loops).
+    inner: called by other kernels only; saves the time to compile what Python would need to call it.
     NaN and the order of sums are kept, so the same scenario gives the same bits on one machine.
     """
-    return numba.njit(cache=True, error_model="numpy", fastmath={"contract"}, forceinline=inline)
+    # Numba knows the last two, its type hints do not.
+    unhinted: dict[str, Any] = {"no_cpython_wrapper": inner, "no_cfunc_wrapper": inner}
+    decorate: Callable[[Callable[..., Any]], Any] = numba.njit(
+        cache=True, error_model="numpy", fastmath={"contract"}, forceinline=inline, **unhinted
+    )
+    return decorate
 
 
 def is_cold() -> bool:

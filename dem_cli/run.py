@@ -22,6 +22,7 @@ from dem_cli.errors import RunError
 from dem_cli.interrupts import marked_interrupts
 from dem_cli.results import ImpulseWriter, ResultWriter
 from dem_cli.results.files import check_target
+from dem_cli.results.run_file import RunFile
 from dem_cli.rigid import BodyFrame, Scene
 from dem_cli.scenario import DiscScenario, ImpulseScenario, QuasiStaticScenario, Scenario, Shake
 from dem_cli.state import Bonds, Frame, Grains, Increment, Ints, Walls
@@ -184,7 +185,7 @@ def begin(
 
 
 @contextmanager
-def warned(writer: ResultWriter) -> Iterator[None]:
+def warned(writer: RunFile) -> Iterator[None]:
     """What ends a run is told among its warnings too."""
     try:
         yield

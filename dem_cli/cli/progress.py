@@ -10,7 +10,8 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any, Self
 
-from dem_cli.scenario import QuasiStaticScenario, Scenario
+from dem_cli.rigid import BodyFrame
+from dem_cli.scenario import ImpulseScenario, QuasiStaticScenario, Scenario
 from dem_cli.state import Frame, Increment
 
 LOG_EVERY = 10.0  # s of wall time between two lines in a log
@@ -22,7 +23,7 @@ SPEED_OVER = 10.0  # s of wall time that the speed is an average of
 class Progress(ABC):
     """A listener of `run_scenario`; a context manager. verbosity -1: silent. What it says of a state is up to the kind of run."""
 
-    def __init__(self, scenario: Scenario | QuasiStaticScenario, verbosity: int = 0) -> None:
+    def __init__(self, scenario: Scenario | QuasiStaticScenario | ImpulseScenario, verbosity: int = 0) -> None:
         self.scenario = scenario
         self.silent = verbosity < 0
         self._began = self._shown = time.monotonic()
@@ -68,7 +69,7 @@ class Progress(ABC):
             else:
                 self.say(f"[packing] {words}")
 
-    def __call__(self, state: Frame | Increment, row: Mapping[str, float] | None) -> None:
+    def __call__(self, state: Frame | Increment | BodyFrame, row: Mapping[str, float] | None) -> None:
         self._row = row or self._row
         count = self.count(state)
         if count > 0:  # compiling is over
@@ -115,39 +116,41 @@ class Progress(ABC):
 
 
 class TimeProgress(Progress):
-    """Progress of a run over time."""
+    """Progress of a run over time, of grains or of rigid bodies."""
 
-    scenario: Scenario
+    scenario: Scenario | ImpulseScenario
     _stage_began = 0.0
 
-    def __call__(self, state: Frame | Increment, row: Mapping[str, float] | None) -> None:
-        if isinstance(state, Frame) and state.stage_start:
+    def __call__(self, state: Frame | Increment | BodyFrame, row: Mapping[str, float] | None) -> None:
+        if isinstance(state, Frame | BodyFrame) and state.stage_start:
             self._stage_began = state.time
         super().__call__(state, row)
 
-    def count(self, state: Frame) -> int:
+    def count(self, state: Frame | BodyFrame) -> int:
         return state.step
 
-    def reached(self, state: Frame, row: Mapping[str, float]) -> str:
-        return f"t = {state.time:.4g} s, {state.step} steps, void ratio {row['void_ratio']:.4f}"
+    def reached(self, state: Frame | BodyFrame, row: Mapping[str, float]) -> str:
+        voids = f", void ratio {row['void_ratio']:.4f}" if math.isfinite(row["void_ratio"]) else ""
+        return f"t = {state.time:.4g} s, {state.step} steps{voids}"
 
-    def words(self, state: Frame) -> str:
-        """Simulated time, speed, time left at most, kinetic energy and void ratio."""
+    def words(self, state: Frame | BodyFrame) -> str:
+        """Simulated time, speed, time left at most, kinetic energy, and void ratio where there is one."""
         speed = self.speed
         left = self._steps_left(state) / speed if speed > 0.0 else float("inf")
         parts = [f"t = {state.time:.3f} s", f"{speed:,.0f} steps/s", f"at most {clock(left)} left"]
         if self._row:
-            parts += [f"E_kin {self._row['kinetic']:.2e} J", f"e {self._row['void_ratio']:.4f}"]
+            parts.append(f"E_kin {self._row['kinetic']:.2e} J")
+            parts += [f"e {self._row['void_ratio']:.4f}"] if math.isfinite(self._row["void_ratio"]) else []
         return ", ".join(parts)
 
-    def _steps_left(self, frame: Frame) -> float:
+    def _steps_left(self, frame: Frame | BodyFrame) -> float:
         later = sum(stage.longest for stage in self.scenario.stages[frame.stage + 1 :])
         return max(self._end(frame) - frame.time + later, 0.0) / frame.dt
 
-    def _end(self, frame: Frame) -> float:
+    def _end(self, frame: Frame | BodyFrame) -> float:
         return self._stage_began + self.scenario.stages[frame.stage].longest
 
-    def share(self, state: Frame) -> float:
+    def share(self, state: Frame | BodyFrame) -> float:
         total = sum(stage.longest for stage in self.scenario.stages)
         before = sum(stage.longest for stage in self.scenario.stages[: state.stage])
         here = self.scenario.stages[state.stage].longest - (self._end(state) - state.time)
@@ -199,9 +202,9 @@ def condition(row: Mapping[str, float]) -> str:
     )
 
 
-def progress_of(scenario: Scenario | QuasiStaticScenario, verbosity: int = 0) -> Progress:
+def progress_of(scenario: Scenario | QuasiStaticScenario | ImpulseScenario, verbosity: int = 0) -> Progress:
     """The listener for a scenario's kind of run."""
-    return (TimeProgress if isinstance(scenario, Scenario) else IncrementProgress)(scenario, verbosity)
+    return (IncrementProgress if isinstance(scenario, QuasiStaticScenario) else TimeProgress)(scenario, verbosity)
 
 
 def clock(seconds: float) -> str:

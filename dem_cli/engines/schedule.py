@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from dem_cli.scenario.impulse_tables import ImpulseOutput
 from dem_cli.scenario.tables import Output
 
 NEAR = 1e-9  # of an interval: two moments this close are one
@@ -12,7 +13,7 @@ NEAR = 1e-9  # of an interval: two moments this close are one
 class Schedule:
     """Moments of one stage that starts at `start` [s] and lasts at most `longest` [s]."""
 
-    def __init__(self, output: Output, start: float, longest: float) -> None:
+    def __init__(self, output: Output | ImpulseOutput, start: float, longest: float) -> None:
         self.end = start + longest
         self.intervals = {"series": output.interval, "frames": output.frames}
         if output.tracks:

@@ -61,14 +61,31 @@ def mesh(vertices: Any, triangles: Any) -> Shape:
     return shape_of("polyhedron", vertices=np.asarray(vertices, dtype=float), triangles=np.asarray(triangles))
 
 
-def cloud_box(size: Sequence[float], many: int) -> Shape:
-    """Particles at the centres of many x many cells of each face of a box; all can be trusted but those at the edges."""
+def subdivided(vertices: Any, triangles: Any, times: int) -> tuple[Floats, Ints]:
+    """Each triangle made four, `times` times; corners of neighbours are listed more than once."""
+    corners = np.asarray(vertices, dtype=float)[np.asarray(triangles)]
+    for _ in range(times):
+        a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+        ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        four = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.concatenate([np.stack(one, axis=1) for one in four])
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+
+
+def round_stone(times: int, radius: float) -> Shape:
+    """A mesh about a sphere: 8 triangles, subdivided."""
+    ends = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+    fan = [(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4), (1, 0, 5), (2, 1, 5), (3, 2, 5), (0, 3, 5)]
+    vertices, triangles = subdivided(ends, fan, times)
+    return mesh(radius * vertices / np.linalg.norm(vertices, axis=1)[:, None], triangles)
+
+
+def cloud_box(size: Sequence[float], many: int, edge: float = 0.3) -> Shape:
+    """Particles at the centres of many x many cells of each face; those up to `edge` from a face's middle, in box sizes, are trusted."""
     points = box(size, many)
     around = np.sort(np.abs(points.points / np.asarray(size)), axis=1)[:, 1]
     spacing = max(size) / many
-    return shape_of(
-        "cloud", points=points.points, normals=points.normals, trusted=around < 0.5 - 0.6 / many, spacing=spacing
-    )
+    return shape_of("cloud", points=points.points, normals=points.normals, trusted=around < edge, spacing=spacing)
 
 
 def scene(

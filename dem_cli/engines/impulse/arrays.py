@@ -67,18 +67,18 @@ class Placed(NamedTuple):
     shape: Ints
 
 
-# Near.count and the rows of Near.item; STAMP: number of the last gathering
+# Near.many and the rows of Near.item; STAMP: number of the last gathering
 TRIANGLES, RIDGES, CORNERS, POINTS, HELD, STAMP = range(6)
 
 
 class Near(NamedTuple):
-    """Features of one body that were gathered: item[k, :count[k]] are indices into `Shapes`. Scratch.
+    """Features of one body that were gathered: item[k, :many[k]] are indices into `Shapes`. Scratch.
 
     seen (3, .): the last gathering that looked at a triangle, edge, vertex, so that each is taken once. height: of a point over the faces HELD.
     """
 
     item: Ints
-    count: Ints
+    many: Ints
     seen: Ints
     height: Floats
 

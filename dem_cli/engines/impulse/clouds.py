@@ -39,7 +39,7 @@ ROUND = 1.000001  # particles of a grid are one spacing apart but for rounding
 BESIDE = 0.9  # cosine of the angle between normals of contacts from both sides that are one
 
 
-@kernel()
+@kernel(inner=True)
 def _particle_below(shapes, near, p, feature, opposed, relation, limits):
     """The nearest trusted particle j of the gathered ones whose plane p touches, and the gap (p - x_j).n_j; -1 for none.
 
@@ -48,7 +48,7 @@ def _particle_below(shapes, near, p, feature, opposed, relation, limits):
     """
     tolerance, depth, spacing = limits
     best, least, gap = -1, np.inf, 0.0
-    for m in range(near.count[POINTS]):
+    for m in range(near.many[POINTS]):
         j = near.item[POINTS, m]
         if not shapes.point[j, TRUSTED]:
             continue
@@ -68,7 +68,7 @@ def _particle_below(shapes, near, p, feature, opposed, relation, limits):
     return best, gap
 
 
-@kernel()
+@kernel(inner=True)
 def _put_particle(shapes, placed, found, ends, pair, owner, p, j, gap, key, merge):
     """A contact of p with particle j of body owner[1]; only if none of the contacts from ends[0] to ends[1] is the same."""
     b = owner[1]
@@ -82,7 +82,7 @@ def _put_particle(shapes, placed, found, ends, pair, owner, p, j, gap, key, merg
     return put(found, pair, key, point, normal, gap * placed.frame[b, SCALE])
 
 
-@kernel()
+@kernel(inner=True)
 def features_on_cloud(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge):
     """Gathered corners and points of body a against the gathered particles of body b; as `faces.features_on_faces`.
 
@@ -91,14 +91,14 @@ def features_on_cloud(shapes, placed, near_a, near_b, relation, found, pair, own
     sa = placed.shape[owner[0]]
     other = 0 if owner[2] > 0 else 1
     ends = found.state[FIRST], found.state[COUNT]
-    for m in range(near_a.count[CORNERS]):
+    for m in range(near_a.many[CORNERS]):
         v = near_a.item[CORNERS, m]
         p = placed_at(relation, row(shapes.vertex, v, PLACE))
         j, gap = _particle_below(shapes, near_b, p, v, UNOPPOSED, relation, limits)
         if j >= 0:
             key = key_of(CORNER_I + other, v - shapes.number[sa, VERTEX0], 0)
             _put_particle(shapes, placed, found, ends, pair, owner, p, j, gap, key, merge)
-    for m in range(near_a.count[POINTS]):
+    for m in range(near_a.many[POINTS]):
         k = near_a.item[POINTS, m]
         p = placed_at(relation, row(shapes.point, k, PLACE))
         j, gap = _particle_below(shapes, near_b, p, -1 - k, opposed_to(shapes, k), relation, limits)
@@ -108,7 +108,7 @@ def features_on_cloud(shapes, placed, near_a, near_b, relation, found, pair, own
             _put_particle(shapes, placed, found, ends, pair, owner, p, j, gap, key, merge)
 
 
-@kernel()
+@kernel(inner=True)
 def spheres_on_cloud(shapes, placed, near, relation, found, pair, owner, tolerance, depth):
     """Contacts of the spheres of body owner[0] with the cloud owner[1]; owner[2]: 1.0 if the spheres are i's, else -1.0.
 
@@ -130,7 +130,7 @@ def spheres_on_cloud(shapes, placed, near, relation, found, pair, owner, toleran
         n = row(shapes.point, max(j, 0), NORMAL)
         if j < 0:
             least = (r + tolerance) * (r + tolerance)
-            for m in range(near.count[POINTS]):
+            for m in range(near.many[POINTS]):
                 d = sub(c, row(shapes.point, near.item[POINTS, m], PLACE))
                 square = dot(d, d)
                 if square > 0.0 and square <= least and dot(d, row(shapes.point, near.item[POINTS, m], NORMAL)) > 0.0:

@@ -69,7 +69,7 @@ def place_spheres(shapes, placed, ball, ball_start, n):
             m += 1
 
 
-@kernel()
+@kernel(inner=True)
 def _on_plane(shapes, placed, found, pair, plane, tolerance):
     """Contacts of body pair[0] with a plane (point, unit normal towards the bodies): what is no higher over it than tolerance [m]."""
     i, (foot, n) = pair[0], plane
@@ -100,7 +100,7 @@ def _on_plane(shapes, placed, found, pair, plane, tolerance):
             put(found, pair, key_of(POINT_I, k - shapes.number[s, POINT0], 0), point, inwards, gap)
 
 
-@kernel()
+@kernel(inner=True)
 def _gather(shapes, near, s, low, high, tight, wide):
     """Corners, edges and points of shape s in the box (low, high) made larger by `tight`, triangles and cloud in that by `wide`."""
     t, w = (tight, tight, tight), (wide, wide, wide)
@@ -109,11 +109,11 @@ def _gather(shapes, near, s, low, high, tight, wide):
         gather_edges(shapes, near, s, sub(low, t), add(high, t))
         gather_points(shapes, near, s, sub(low, t), add(high, t))
     else:
-        near.count[TRIANGLES] = near.count[RIDGES] = near.count[CORNERS] = 0
+        near.many[TRIANGLES] = near.many[RIDGES] = near.many[CORNERS] = 0
         gather_points(shapes, near, s, sub(low, w), add(high, w))
 
 
-@kernel()
+@kernel(inner=True)
 def _gather_both(shapes, placed, nears, rows, to_i, to_j, margins):
     """Features of both bodies that may touch, into `nears`; margins: (tight, depth, spacing) [m].
 
@@ -148,7 +148,7 @@ def _gather_both(shapes, placed, nears, rows, to_i, to_j, margins):
     return depth
 
 
-@kernel()
+@kernel(inner=True)
 def _features(shapes, placed, near_a, near_b, relation, found, pair, owner, margins, merge):
     """Corners and points of body owner[0] on the faces or particles of body owner[1]; margins: (tolerance, depth, border, spacing) [m]."""
     f = 1.0 / placed.frame[owner[1], SCALE]
@@ -161,7 +161,7 @@ def _features(shapes, placed, near_a, near_b, relation, found, pair, owner, marg
         features_on_cloud(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge)
 
 
-@kernel()
+@kernel(inner=True)
 def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
     """Contacts of two bodies (rows of `placed`) that are polyhedra or clouds."""
     i, j = rows
@@ -190,7 +190,7 @@ def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
             keep_least(shapes, placed, found, rows, reach)
 
 
-@kernel()
+@kernel(inner=True)
 def _spheres_on(shapes, placed, near, found, pair, owner, tolerance):
     """Contacts of the spheres of body owner[0] with the surface or cloud owner[1]; owner[2]: 1.0 if the spheres are i's, else -1.0."""
     a, b, _ = owner
@@ -209,21 +209,12 @@ def _spheres_on(shapes, placed, near, found, pair, owner, tolerance):
     spheres_on_mesh(shapes, placed, near, relation, found, pair, owner, scaled, MERGE * reach)
 
 
-@kernel()
-def _pair(shapes, placed, nears, ball, ball_start, found, pair, rows, tolerance):
-    """Contacts of the bodies in rows (i, j) of `placed`, j's name in pair[1]; sorted by key."""
-    found.state[FIRST] = found.state[COUNT]
-    i, j = rows
-    ki, kj = shapes.number[placed.shape[i], KIND], shapes.number[placed.shape[j], KIND]
-    if ki == SPHERES and kj == SPHERES:
-        spheres_on_spheres(placed, ball, ball_start, found, rows, tolerance)
-    elif ki == SPHERES:
-        _spheres_on(shapes, placed, nears[1], found, pair, (i, j, 1.0), tolerance)
-    elif kj == SPHERES:
-        _spheres_on(shapes, placed, nears[0], found, pair, (j, i, -1.0), tolerance)
-    else:
-        _on_surface(shapes, placed, nears, found, pair, rows, tolerance)
-    sort_pair(found)
+@kernel(inline=True, inner=True)
+def _near(placed, i, j, tolerance):
+    """Whether the spheres about two bodies are no farther apart than the tolerance."""
+    d = sub(row(placed.frame, j, CENTER), row(placed.frame, i, CENTER))
+    far = placed.frame[i, RADIUS] + placed.frame[j, RADIUS] + tolerance
+    return dot(d, d) <= far * far
 
 
 @kernel()
@@ -239,17 +230,26 @@ def find(shapes, placed, ball, ball_start, nears, walls, alive, start, neighbour
     """
     found.state[COUNT] = 0
     n, planes = alive.size, walls.shape[0]
+    ground = placed.shape.size > n
     for i in range(n):
         if not alive[i]:
             continue
-        if placed.shape.size > n:
-            _pair(shapes, placed, nears, ball, ball_start, found, (i, -1 - planes), (i, n), tolerance)
-        for w in range(planes - 1, -1, -1):
-            plane = row(walls, w, 0), row(walls, w, 3)
-            _on_plane(shapes, placed, found, (i, -1 - w), plane, tolerance)
-        x, reach = row(placed.frame, i, CENTER), placed.frame[i, RADIUS] + tolerance
-        for k in range(start[i], start[i + 1]):
-            j = np.int64(neighbour[k])
-            d, far = sub(row(placed.frame, j, CENTER), x), reach + placed.frame[j, RADIUS]
-            if dot(d, d) <= far * far:
-                _pair(shapes, placed, nears, ball, ball_start, found, (i, j), (i, j), tolerance)
+        before = start[i] - 1  # the terrain comes before the planes, and both before other bodies
+        for k in range(before, start[i + 1]):
+            j = n if k == before else np.int64(neighbour[k])
+            if (k > before and _near(placed, i, j, tolerance)) or (k == before and ground):
+                found.state[FIRST] = found.state[COUNT]
+                pair = i, (-1 - planes if k == before else j)
+                ki, kj = shapes.number[placed.shape[i], KIND], shapes.number[placed.shape[j], KIND]
+                if ki == SPHERES and kj == SPHERES:
+                    spheres_on_spheres(placed, ball, ball_start, found, pair, tolerance)
+                elif ki == SPHERES or kj == SPHERES:
+                    owner = (i, j, 1.0) if ki == SPHERES else (j, i, -1.0)
+                    _spheres_on(shapes, placed, nears[0], found, pair, owner, tolerance)
+                else:
+                    _on_surface(shapes, placed, nears, found, pair, (i, j), tolerance)
+                sort_pair(found)
+            if k == before:
+                for w in range(planes - 1, -1, -1):
+                    plane = row(walls, w, 0), row(walls, w, 3)
+                    _on_plane(shapes, placed, found, (i, -1 - w), plane, tolerance)

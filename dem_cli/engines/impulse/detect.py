@@ -65,17 +65,13 @@ class ContactSearch:
 
     def _neighbours(self, x: Floats, tolerance: float) -> tuple[Any, Any]:
         """The half list, made anew if a body may have come as near as the tolerance to one that it does not hold."""
+        moved, bad = farthest_move(x, x if self._listed is None else self._listed[0], self.alive)
+        if bad >= 0:
+            raise RunError(f"body {bad} is at no finite place")
         if self._listed is not None:
-            old, alive, wide, start, neighbour = self._listed
-            moved, bad = farthest_move(x, old, self.alive)
-            if bad >= 0:
-                raise RunError(f"body {bad} is at no finite place")
+            _, alive, wide, start, neighbour = self._listed
             if 2.0 * moved + tolerance <= wide and np.array_equal(alive, self.alive):
                 return start, neighbour
-        else:
-            _, bad = farthest_move(x, x, self.alive)
-            if bad >= 0:
-                raise RunError(f"body {bad} is at no finite place")
         wide = self._skin + tolerance
         start, neighbour = neighbour_list(x, self._reach, self.alive, wide)
         self._listed = x.copy(), self.alive.copy(), wide, start, neighbour
@@ -85,6 +81,7 @@ class ContactSearch:
     def look(self, x: Floats, q: Floats, tolerance: float) -> Touching:
         """All contacts with gap <= tolerance [m] of bodies at x (n, 3) [m], turned by the unit quaternions q (n, 4)."""
         n = len(self.alive)
+        x, q = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(q, dtype=np.float64)
         start, neighbour = self._neighbours(x, tolerance)
         set_turns(self.placed, x, q, n)
         place_spheres(self.shapes, self.placed, self._ball, self._ball_start, n)
@@ -95,5 +92,8 @@ class ContactSearch:
             )  # fmt: skip
             count = int(self._found.state[COUNT])
             if count <= len(self._found.i):
-                return Touching(*(array[:count] for array in self._found[:-1]))
+                f = self._found
+                return Touching(
+                    f.i[:count], f.j[:count], f.key[:count], f.point[:count], f.normal[:count], f.gap[:count]
+                )
             self._found = empty_found(count + count // 4)

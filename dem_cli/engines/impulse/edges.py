@@ -42,7 +42,7 @@ MARGIN = 1e-4  # overlap that two normals may differ by and both be kept, over t
 ALIKE = 0.995  # cosine of the angle between normals that are kept whatever their overlaps
 
 
-@kernel()
+@kernel(inner=True)
 def _crossing(shapes, e, p, d, length, t1, t2, q, limits):
     """Contact of an edge at p along unit d, with t1, t2 into its faces, and edge e of j's shape, all in j's frame.
 
@@ -75,7 +75,7 @@ def _crossing(shapes, e, p, d, length, t1, t2, q, limits):
     return True, s, n, gap
 
 
-@kernel()
+@kernel(inner=True)
 def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, limits, merge):
     """Gathered convex edges of body i = rows[0] against those of j = rows[1]; relation: `relative` of i and j.
 
@@ -84,7 +84,7 @@ def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, 
     i, j = rows
     si, sj = placed.shape[i], placed.shape[j]
     wide = limits[0] + limits[2]
-    for m in range(near_i.count[RIDGES]):
+    for m in range(near_i.many[RIDGES]):
         e = near_i.item[RIDGES, m]
         p, end = (
             placed_at(relation, row(shapes.vertex, shapes.edge_part[e, END], PLACE)),
@@ -99,7 +99,7 @@ def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, 
         )
         low = min(p[0], end[0]), min(p[1], end[1]), min(p[2], end[2])
         high = max(p[0], end[0]), max(p[1], end[1]), max(p[2], end[2])
-        for r in range(near_j.count[RIDGES]):
+        for r in range(near_j.many[RIDGES]):
             k = near_j.item[RIDGES, r]
             q, tip = (
                 row(shapes.vertex, shapes.edge_part[k, END], PLACE),
@@ -120,7 +120,7 @@ def edges_on_edges(shapes, placed, near_i, near_j, relation, found, pair, rows, 
                 put_new(found, pair, key, point, normal, gap * placed.frame[j, SCALE], merge, SAME)
 
 
-@kernel()
+@kernel(inner=True)
 def _farthest(shapes, placed, i, n):
     """Largest x . n of the corners of body i."""
     s = placed.shape[i]
@@ -131,12 +131,12 @@ def _farthest(shapes, placed, i, n):
     return most * placed.frame[i, SCALE] + dot(row(placed.frame, i, CENTER), n)
 
 
-@kernel()
+@kernel(inner=True)
 def _overlap(shapes, placed, rows, n):
     return _farthest(shapes, placed, rows[0], n) + _farthest(shapes, placed, rows[1], times(n, -1.0))
 
 
-@kernel()
+@kernel(inner=True)
 def keep_least(shapes, placed, found, rows, reach):
     """Of the contacts of two convex bodies, those along the normal of least overlap.
 

@@ -110,7 +110,7 @@ class ImpulseEngine:
         state, start = self.state, self.state.time
         steps = max(math.ceil((moment - start) / self.time_step * (1.0 - 1e-9)), 1)
         dt = (moment - start) / steps
-        middles = (np.arange(steps) + 0.5) * dt + (start - self.stage_started)
+        middles = (np.arange(steps, dtype=np.float64) + 0.5) * dt + (start - self.stage_started)
         driving = -ground.acceleration(middles) @ turn if ground.moves else np.zeros((steps, 3))
         for k in range(steps):
             before = state.energies.copy() if ground.moves else state.energies

@@ -48,13 +48,13 @@ OPPOSED = -0.5  # cosine of the angle between normals of a face point and the fa
 UNOPPOSED = 2.0  # the same for what has no normal
 
 
-@kernel()
+@kernel(inner=True)
 def opposed_to(shapes, k):
     """Largest cosine of the angle between the normal of point k and that of what it touches."""
     return OPPOSED if shapes.point[k, TRUSTED] > 0.0 else UNOPPOSED
 
 
-@kernel()
+@kernel(inner=True)
 def _over(shapes, t, p, height, border):
     """Whether p, at `height` over the plane of triangle t, lies over the triangle, or below a valley at its side."""
     for k in range(3):
@@ -67,7 +67,7 @@ def _over(shapes, t, p, height, border):
     return True
 
 
-@kernel()
+@kernel(inner=True)
 def _face_to_face(shapes, a, b):
     """Whether triangles a and b have each other's middle in front, as the two sides of a valley do."""
     way = sub(row(shapes.triangle, b, MIDDLE), row(shapes.triangle, a, MIDDLE))
@@ -76,7 +76,7 @@ def _face_to_face(shapes, a, b):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def corner_fits(shapes, v, n):
     """Whether all edges that leave corner v point away from a face with normal n, in the corner's frame; by 10 degrees they need not."""
     least = 0.0
@@ -85,7 +85,7 @@ def corner_fits(shapes, v, n):
     return least >= -DIP
 
 
-@kernel()
+@kernel(inner=True)
 def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
     """Faces of shape s that a point p in its frame touches: near.held and near.height, the first of the number returned.
 
@@ -94,8 +94,9 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
     is from -depth to tolerance, and the body could touch it there; of those the nearest, and others only that face it across a valley.
     """
     tolerance, depth, border = limits
-    many, convex = 0, shapes.number[s, CONVEX]
-    for m in range(near.count[TRIANGLES]):
+    count, convex = near.many, shapes.number[s, CONVEX]
+    count[HELD] = 0
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         n = row(shapes.triangle, t, FACE_NORMAL)
         height = dot(sub(p, row(shapes.triangle, t, MIDDLE)), n)
@@ -109,14 +110,15 @@ def touched_faces(shapes, near, s, p, feature, opposed, relation, limits):
                 continue
         elif dot(row(shapes.point, -1 - feature, NORMAL), n) > opposed:
             continue
-        near.item[HELD, many], near.height[many] = t, height
-        many += 1
-    return _nearest(shapes, near, many, tolerance)
+        near.item[HELD, count[HELD]], near.height[count[HELD]] = t, height
+        count[HELD] += 1
+    return _nearest(shapes, near, tolerance)
 
 
-@kernel()
-def _nearest(shapes, near, many, tolerance):
+@kernel(inner=True)
+def _nearest(shapes, near, tolerance):
     """Of the faces near.held those that are the nearest, or face all nearer ones, and are no higher than the tolerance."""
+    many = near.many[HELD]
     for k in range(1, many):
         m, t, height = k, near.item[HELD, k], near.height[k]
         while m > 0 and (
@@ -147,7 +149,7 @@ def _nearest(shapes, near, many, tolerance):
     return touching
 
 
-@kernel()
+@kernel(inner=True)
 def _put_faces(shapes, placed, near, many, found, pair, owner, p, kind, feature, merge):
     """Contacts of point p of body `owner[0]`, in the frame of body `owner[1]`, with the first faces of near.held; owner[2]: 1 if i's."""
     b, scale = owner[1], placed.frame[owner[1], SCALE]
@@ -160,7 +162,7 @@ def _put_faces(shapes, placed, near, many, found, pair, owner, p, kind, feature,
         put_new(found, pair, key, point, normal, height * scale, merge, SAME)
 
 
-@kernel()
+@kernel(inner=True)
 def features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, owner, limits, merge):
     """Gathered corners and points of body a against the gathered triangles of body b.
 
@@ -172,14 +174,14 @@ def features_on_faces(shapes, placed, near_a, near_b, relation, found, pair, own
     low, high = row(shapes.size, sb, LOW), row(shapes.size, sb, HIGH)
     low, high = (low[0] - wide, low[1] - wide, low[2] - wide), (high[0] + wide, high[1] + wide, high[2] + wide)
     other = 0 if sign > 0 else 1
-    for m in range(near_a.count[CORNERS]):
+    for m in range(near_a.many[CORNERS]):
         v = near_a.item[CORNERS, m]
         p = placed_at(relation, row(shapes.vertex, v, PLACE))
         if holds(low, high, p):
             many = touched_faces(shapes, near_b, sb, p, v, UNOPPOSED, relation, limits)
             v -= shapes.number[sa, VERTEX0]
             _put_faces(shapes, placed, near_b, many, found, pair, owner, p, CORNER_I + other, v, merge)
-    for m in range(near_a.count[POINTS]):
+    for m in range(near_a.many[POINTS]):
         k = near_a.item[POINTS, m]
         p = placed_at(relation, row(shapes.point, k, PLACE))
         if holds(low, high, p):

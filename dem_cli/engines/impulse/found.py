@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from dem_cli.engines.impulse.arrays import COUNT, FIRST, Found
-from dem_cli.engines.impulse.search import order_of
 from dem_cli.engines.impulse.vectors import dot, row, sub
 from dem_cli.jit import kernel
 
@@ -22,12 +21,12 @@ def empty_found(capacity: int) -> Found:
     )  # fmt: skip
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def key_of(kind, first, second):
     return (((np.int64(kind) << SHIFT) | np.int64(first)) << SHIFT) | np.int64(second)
 
 
-@kernel()
+@kernel(inner=True)
 def put(found, pair, key, point, normal, gap):
     """Add a contact of pair (i, j). Beyond the capacity they are counted only."""
     k = found.state[COUNT]
@@ -38,7 +37,7 @@ def put(found, pair, key, point, normal, gap):
         found.normal[k, 0], found.normal[k, 1], found.normal[k, 2] = normal
 
 
-@kernel()
+@kernel(inner=True)
 def put_new(found, pair, key, point, normal, gap, near, same):
     """`put`, unless the pair has one of this key, or one closer than `near` [m] with its normal within the angle of cosine `same`."""
     for k in range(found.state[FIRST], min(found.state[COUNT], found.i.size)):
@@ -50,7 +49,7 @@ def put_new(found, pair, key, point, normal, gap, near, same):
     put(found, pair, key, point, normal, gap)
 
 
-@kernel()
+@kernel(inner=True)
 def move(found, a, b):
     """Write contact b over contact a of the same pair."""
     found.key[a], found.gap[a] = found.key[b], found.gap[b]
@@ -58,17 +57,18 @@ def move(found, a, b):
         found.point[a, c], found.normal[a, c] = found.point[b, c], found.normal[b, c]
 
 
-@kernel()
+@kernel(inner=True)
 def sort_pair(found):
-    """Sort the contacts of the present pair by key, in place; they mostly are."""
+    """Sort the contacts of the present pair by key, in place, by insertion: they mostly are."""
     first, end = found.state[FIRST], min(found.state[COUNT], found.i.size)
-    sorted_already = True
     for k in range(first + 1, end):
-        sorted_already = sorted_already and found.key[k - 1] < found.key[k]
-    if sorted_already:
-        return
-    order = order_of(found.key[first:end])
-    found.key[first:end] = found.key[first:end][order]
-    found.gap[first:end] = found.gap[first:end][order]
-    found.point[first:end] = found.point[first:end][order]
-    found.normal[first:end] = found.normal[first:end][order]
+        key, gap = found.key[k], found.gap[k]
+        point, normal = row(found.point, k, 0), row(found.normal, k, 0)
+        m = k
+        while m > first and found.key[m - 1] > key:
+            move(found, m, m - 1)
+            m -= 1
+        if m < k:
+            found.key[m], found.gap[m] = key, gap
+            found.point[m, 0], found.point[m, 1], found.point[m, 2] = point
+            found.normal[m, 0], found.normal[m, 1], found.normal[m, 2] = normal

@@ -33,13 +33,13 @@ from dem_cli.jit import kernel
 FEW = 40  # triangles that are looked at one by one rather than by the grid
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _half(shapes, s):
     low, high = row(shapes.size, s, LOW), row(shapes.size, s, HIGH)
     return times(add(low, high), 0.5), times(sub(high, low), 0.5)
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _spread(m, h):
     """Half edges of the upright box about a box with half edges h that is turned by m."""
     return (
@@ -49,7 +49,7 @@ def _spread(m, h):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def box_seen(shapes, s, relation):
     """Corners (low, high) of the upright box, in b's frame, about the box of body a with shape s; relation: `relative` of a and b."""
     middle, half = _half(shapes, s)
@@ -58,7 +58,7 @@ def box_seen(shapes, s, relation):
     return sub(center, half), add(center, half)
 
 
-@kernel()
+@kernel(inner=True)
 def boxes_apart(shapes, a, b, relation, tolerance):
     """Whether the boxes of shapes a and b are farther apart than `tolerance` in b's frame, by the separating axis theorem (15 axes)."""
     m, _, f = relation
@@ -88,7 +88,7 @@ def boxes_apart(shapes, a, b, relation, tolerance):
     return False
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _meets(low, high, a_low, a_high):
     return (
         a_low[0] <= high[0] and a_high[0] >= low[0] and a_low[1] <= high[1] and a_high[1] >= low[1]
@@ -96,14 +96,14 @@ def _meets(low, high, a_low, a_high):
     )  # fmt: skip
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def holds(low, high, p):
     return (
         low[0] <= p[0] and p[0] <= high[0] and low[1] <= p[1] and p[1] <= high[1] and low[2] <= p[2] and p[2] <= high[2]
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _cut(low, high, origin, cell, many):
     """First and last of the cells along an axis that meet an interval; there are none where the last is less than the first."""
     return int(min(max((low - origin) / cell, 0.0), float(many))), int(
@@ -111,7 +111,7 @@ def _cut(low, high, origin, cell, many):
     )
 
 
-@kernel()
+@kernel(inner=True)
 def _cells(shapes, s, low, high, number, size):
     """Cells of a grid that a box meets: (x0, x1, y0, y1, z0, z1). number, size: where the grid's columns start."""
     origin, cell, many = row(shapes.size, s, size), shapes.size[s, size + 3], row(shapes.number, s, number + 1)
@@ -121,31 +121,31 @@ def _cells(shapes, s, low, high, number, size):
     return x0, x1, y0, y1, z0, z1
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _span(shapes, s, number, x, y, z0, z1):
     """Members of the cells z0 to z1 of column (x, y): the first, and one past the last."""
     at = shapes.number[s, number] + (x * shapes.number[s, number + 2] + y) * shapes.number[s, number + 3]
     return shapes.cell[at + z0], shapes.cell[at + max(z1 + 1, z0)]
 
 
-@kernel()
+@kernel(inner=True)
 def _take_triangle(shapes, near, t, low, high):
     if _meets(low, high, row(shapes.triangle, t, BOX_LOW), row(shapes.triangle, t, BOX_HIGH)):
-        near.item[TRIANGLES, near.count[TRIANGLES]] = t
-        near.count[TRIANGLES] += 1
+        near.item[TRIANGLES, near.many[TRIANGLES]] = t
+        near.many[TRIANGLES] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_triangles(shapes, near, s, low, high):
     """Triangles of shape s whose boxes meet the box (low, high), into `near`."""
-    near.count[TRIANGLES] = 0
+    near.many[TRIANGLES] = 0
     start, end = shapes.number[s, TRIANGLE0], shapes.number[s + 1, TRIANGLE0]
     if end - start <= FEW:
         for t in range(start, end):
             _take_triangle(shapes, near, t, low, high)
         return
-    near.count[STAMP] += 1
-    stamp = near.count[STAMP]
+    near.many[STAMP] += 1
+    stamp = near.many[STAMP]
     x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, TRIANGLE_GRID, TRIANGLE_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
@@ -157,7 +157,7 @@ def gather_triangles(shapes, near, s, low, high):
                     _take_triangle(shapes, near, t, low, high)
 
 
-@kernel()
+@kernel(inner=True)
 def _take_ridge(shapes, near, e, low, high):
     a, b = (
         row(shapes.vertex, shapes.edge_part[e, END], PLACE),
@@ -167,25 +167,25 @@ def _take_ridge(shapes, near, e, low, high):
         min(a[0], b[0]) <= high[0] and max(a[0], b[0]) >= low[0] and min(a[1], b[1]) <= high[1]
         and max(a[1], b[1]) >= low[1] and min(a[2], b[2]) <= high[2] and max(a[2], b[2]) >= low[2]
     ):  # fmt: skip
-        near.item[RIDGES, near.count[RIDGES]] = e
-        near.count[RIDGES] += 1
+        near.item[RIDGES, near.many[RIDGES]] = e
+        near.many[RIDGES] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_edges(shapes, near, s, low, high):
     """Corners and convex edges of shape s that meet the box (low, high), into `near`, whose triangles are gathered in a box as large."""
-    near.count[RIDGES] = near.count[CORNERS] = 0
+    near.many[RIDGES] = near.many[CORNERS] = 0
     if shapes.number[s + 1, TRIANGLE0] - shapes.number[s, TRIANGLE0] <= FEW:
         for k in range(shapes.number[s, RIDGE0], shapes.number[s + 1, RIDGE0]):
             _take_ridge(shapes, near, shapes.ridge[k], low, high)
         for k in range(shapes.number[s, CORNER0], shapes.number[s + 1, CORNER0]):
             if holds(low, high, row(shapes.vertex, shapes.corner[k], PLACE)):
-                near.item[CORNERS, near.count[CORNERS]] = shapes.corner[k]
-                near.count[CORNERS] += 1
+                near.item[CORNERS, near.many[CORNERS]] = shapes.corner[k]
+                near.many[CORNERS] += 1
         return
-    near.count[STAMP] += 1
-    stamp = near.count[STAMP]
-    for m in range(near.count[TRIANGLES]):
+    near.many[STAMP] += 1
+    stamp = near.many[STAMP]
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         for k in range(3):
             e, v = shapes.triangle_part[t, TRIANGLE_EDGE + k], shapes.triangle_part[t, TRIANGLE_VERTEX + k]
@@ -196,14 +196,14 @@ def gather_edges(shapes, near, s, low, high):
             if near.seen[2, v] != stamp:
                 near.seen[2, v] = stamp
                 if shapes.vertex_part[v, IS_CORNER] and holds(low, high, row(shapes.vertex, v, PLACE)):
-                    near.item[CORNERS, near.count[CORNERS]] = v
-                    near.count[CORNERS] += 1
+                    near.item[CORNERS, near.many[CORNERS]] = v
+                    near.many[CORNERS] += 1
 
 
-@kernel()
+@kernel(inner=True)
 def gather_points(shapes, near, s, low, high):
     """Face points or particles of shape s in the box (low, high), into `near`."""
-    near.count[POINTS] = 0
+    near.many[POINTS] = 0
     x0, x1, y0, y1, z0, z1 = _cells(shapes, s, low, high, POINT_GRID, POINT_CELL)
     for x in range(x0, x1 + 1):
         for y in range(y0, y1 + 1):
@@ -211,5 +211,5 @@ def gather_points(shapes, near, s, low, high):
             for m in range(first, last):
                 k = shapes.member[m]
                 if holds(low, high, row(shapes.point, k, PLACE)):
-                    near.item[POINTS, near.count[POINTS]] = k
-                    near.count[POINTS] += 1
+                    near.item[POINTS, near.many[POINTS]] = k
+                    near.many[POINTS] += 1

@@ -38,7 +38,7 @@ def order_of(key):
     return order
 
 
-@kernel()
+@kernel(inner=True)
 def _stable_by(number, n, order):
     """`order` sorted by number[order], numbers 0 to n - 1, stably: (start (n + 1,), sorted order)."""
     start = np.zeros(n + 2, np.int64)
@@ -53,18 +53,18 @@ def _stable_by(number, n, order):
     return start[: n + 1], result
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _cell(x, low, cell):
     return np.int64(min(max((x - low) / cell, 0.0), MOST - 1.0))
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def _code(level, x, y, z):
     """Order of a cell: cells along z follow one another."""
     return ((((level << BITS) | x) << BITS) | y) << BITS | z
 
 
-@kernel()
+@kernel(inner=True)
 def _levels(radius, alive):
     """Level of each body (n,), and how many there are: the smallest radius r0 and up to 2 r0 is level 0, then 4 r0, ...; at most 64."""
     n = radius.size
@@ -81,7 +81,7 @@ def _levels(radius, alive):
     return level, count
 
 
-@kernel()
+@kernel(inner=True)
 def _sorted(x, radius, alive, skin):
     """Living bodies sorted by cell: (order, code of each in that order, level of each body, low (3,), cell size and start of each level)."""
     n = radius.size
@@ -108,7 +108,7 @@ def _sorted(x, radius, alive, skin):
     return order, code[order], level, low, cell, largest
 
 
-@kernel()
+@kernel(inner=True)
 def _first(code, wanted):
     """How many of the ascending codes are below `wanted`."""
     low, high = 0, code.size
@@ -121,7 +121,7 @@ def _first(code, wanted):
     return low
 
 
-@kernel()
+@kernel(inner=True)
 def _pairs(x, radius, alive, skin):
     """All pairs (first, second), each once, in no special order; first < second."""
     order, code, level, low, cell, largest = _sorted(x, radius, alive, skin)

@@ -24,7 +24,7 @@ from dem_cli.jit import kernel
 TURNS = 8  # of the direction, while the overlap is looked for
 
 
-@kernel()
+@kernel(inner=True)
 def _support(shapes, placed, i, n):
     """The point of body i that is farthest along n, in the container's frame."""
     s = placed.shape[i]
@@ -41,7 +41,7 @@ def _support(shapes, placed, i, n):
     return to_world(placed, i, best)
 
 
-@kernel()
+@kernel(inner=True)
 def overlap_between(shapes, placed, i, j, enough):
     """(unit n from i to j, low, high): a direction along which bodies i and j overlap little, from low = min x.n of j to high = max x.n of i.
 
@@ -69,18 +69,18 @@ def overlap_between(shapes, placed, i, j, enough):
     return best, low, high
 
 
-@kernel()
+@kernel(inner=True)
 def _height(shapes, v, way):
     return dot(row(shapes.vertex, v, PLACE), way)
 
 
-@kernel()
+@kernel(inner=True)
 def keep_beyond(shapes, placed, near, i, n, least, faces):
     """Of the gathered features of body i keep those that reach x.n >= least [m]; triangles, and points if of a cloud, x.n >= faces."""
     way = turned_back(turn_of(placed, i), n)
     from_center, f = dot(row(placed.frame, i, CENTER), n), 1.0 / placed.frame[i, SCALE]
     least, faces = (least - from_center) * f, (faces - from_center) * f
-    item, count, part = near.item, near.count, shapes.triangle_part
+    item, count, part = near.item, near.many, shapes.triangle_part
     kept = 0
     for m in range(count[TRIANGLES]):
         t = item[TRIANGLES, m]

@@ -47,7 +47,7 @@ BEYOND = 1.5  # how far from a centre triangles are looked for, in radii: a cent
 ROUND = 1e-9  # sine of an angle that rounding makes
 
 
-@kernel()
+@kernel(inner=True)
 def spheres_on_spheres(placed, ball, ball_start, found, pair, tolerance):
     """Contacts of two bodies of spheres (pair (i, j), both bodies): gap = |x_j - x_i| - r_i - r_j.
 
@@ -73,7 +73,7 @@ def spheres_on_spheres(placed, ball, ball_start, found, pair, tolerance):
             put(found, pair, key, along(p, n, r + 0.5 * gap), n, gap)
 
 
-@kernel()
+@kernel(inner=True)
 def closest_on_triangle(shapes, t, c):
     """Closest point of triangle t to c, and on what it lies: (point, FACE, t), (point, EDGE, edge) or (point, VERTEX, vertex)."""
     va, vb, vc = (
@@ -108,7 +108,7 @@ def closest_on_triangle(shapes, t, c):
     return along(c, n, -dot(ac, n)), FACE, t
 
 
-@kernel()
+@kernel(inner=True)
 def _outward(shapes, t, kind, feature):
     """Outward direction at a feature of triangle t, not of unit length at edges: which side of the surface a point lies on."""
     if kind == FACE:
@@ -123,7 +123,7 @@ def _outward(shapes, t, kind, feature):
     return times(lean, -float(shapes.edge_part[feature, BEND]))
 
 
-@kernel()
+@kernel(inner=True)
 def _is_nearest_around(shapes, t, kind, feature, d):
     """Whether no point of the surface next to the feature is nearer than it to a point at the unit direction d."""
     if kind == FACE:
@@ -139,7 +139,7 @@ def _is_nearest_around(shapes, t, kind, feature, d):
     return True
 
 
-@kernel()
+@kernel(inner=True)
 def _at_rim(shapes, t, kind, feature):
     """Whether a feature of triangle t lies where the surface ends."""
     if kind == EDGE:
@@ -154,11 +154,11 @@ def _at_rim(shapes, t, kind, feature):
     return False
 
 
-@kernel()
+@kernel(inner=True)
 def _nearest_feature(shapes, near, c):
     """(distance, triangle, point, kind, feature) of the gathered triangle nearest to c, and whether c is inside."""
     least, best, q, kind, feature = np.inf, -1, c, FACE, -1
-    for m in range(near.count[TRIANGLES]):
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         p, k, f = closest_on_triangle(shapes, t, c)
         d = sub(c, p)
@@ -169,7 +169,7 @@ def _nearest_feature(shapes, near, c):
     return np.sqrt(least), best, q, kind, feature, inside
 
 
-@kernel()
+@kernel(inner=True)
 def _feature_key(shapes, t, kind, feature, a):
     """Key of sphere a on a feature: of a flat face one and the same wherever the sphere is."""
     if kind == EDGE and shapes.edge_part[feature, BEND] != 0:
@@ -179,7 +179,7 @@ def _feature_key(shapes, t, kind, feature, a):
     return key_of(SPHERE, a, shapes.triangle_part[t, GROUP] * 3 + FACE)
 
 
-@kernel()
+@kernel(inner=True)
 def sphere_on_mesh(shapes, placed, near, found, pair, owner, c, r, a, tolerance, merge):
     """Contacts of one sphere with the surface of body owner[0], in its frame of scale 1.
 
@@ -206,7 +206,7 @@ def sphere_on_mesh(shapes, placed, near, found, pair, owner, c, r, a, tolerance,
         point = to_world(placed, b, along(q, n, 0.5 * gap))
         put_new(found, pair, key, point, turned(turn, times(n, -sign)), gap * scale, merge, SAME)
         return
-    for m in range(near.count[TRIANGLES]):
+    for m in range(near.many[TRIANGLES]):
         t = near.item[TRIANGLES, m]
         q, kind, feature = closest_on_triangle(shapes, t, c)
         d = sub(c, q)
@@ -223,7 +223,7 @@ def sphere_on_mesh(shapes, placed, near, found, pair, owner, c, r, a, tolerance,
         put_new(found, pair, key, point, turned(turn, times(d, -sign)), gap * scale, merge, SAME)
 
 
-@kernel()
+@kernel(inner=True)
 def spheres_on_mesh(shapes, placed, near, relation, found, pair, owner, tolerance, merge):
     """Contacts of all spheres of body owner[0] with the surface of body owner[1]; owner[2]: 1.0 if the spheres are i's, else -1.0.
 

@@ -10,8 +10,8 @@ from dem_cli.engines.impulse.detect import ContactSearch
 from dem_cli.engines.impulse.detect import Touching as Found
 from dem_cli.engines.impulse.drift import drift, kinetic_energy, turn_inverse
 from dem_cli.engines.impulse.impact import PGS, TRACKING
-from dem_cli.engines.impulse.rows import WIDTH, fill_rows
 from dem_cli.engines.impulse.islands import split_islands
+from dem_cli.engines.impulse.rows import WIDTH, fill_rows
 from dem_cli.engines.impulse.step import (
     CAPPED,
     COUNTS,
@@ -36,13 +36,18 @@ from dem_cli.engines.impulse.step import (
     take_back,
 )
 from dem_cli.rigid import Bodies, BodyContacts, ImpulseEnergy, Scene, Solving
-import typing
-
-ImpulseScenario = typing.Any
+from dem_cli.scenario import ImpulseScenario
 from dem_cli.state import Floats, Ints
 
 QUANTA, QUANTA_AT_MOST = 50, 100000  # of energy tracking where it stands in for sweeps that do not end
 GAP = 1e-6  # of the smallest body's reach: contacts further apart than this do not touch
+
+
+def copied(found: Found) -> Found:
+    """Contacts that outlive the next look."""
+    return Found(
+        found.i.copy(), found.j.copy(), found.key.copy(), found.point.copy(), found.normal.copy(), found.gap.copy()
+    )
 
 
 @dataclass
@@ -67,7 +72,7 @@ class ImpulseState:
     found: Found | None = None
     energies: Floats = field(default_factory=lambda: np.zeros(ENERGIES))
     counts: Floats = field(default_factory=lambda: np.zeros(COUNTS))
-    start: ImpulseEnergy = ImpulseEnergy()
+    start: ImpulseEnergy = field(default_factory=ImpulseEnergy)
     lowest: float = np.inf
     given: float = 0.0
     escaped: float = 0.0
@@ -99,7 +104,7 @@ class ImpulseState:
     def look(self) -> Touching:
         """Contacts where the bodies are now, with the load impulses that they had in the step before."""
         n, moving, last, before = len(self.moving.mass), self.moving, self.last, self.found
-        found = Found(*(part.copy() for part in self.search.look(moving.x[:n], moving.q, self.tolerance)))
+        found = copied(self.search.look(moving.x[:n], moving.q, self.tolerance))
         of_i, of_j = self.materials[found.i], self.materials[found.j]
         load = np.empty((len(found.i), 3))
         if last is not None and before is not None:
@@ -172,7 +177,7 @@ class ImpulseState:
         moving.velocity[:n][outside] = 0.0
         self.search.alive[:] = moving.present
         self.escaped += before.stored - self.energy().stored
-        return self.scene.bodies.id[outside].tolist()
+        return [int(one) for one in self.scene.bodies.id[outside]]
 
     def energy(self) -> ImpulseEnergy:
         """The ledger now."""

@@ -60,11 +60,13 @@ class Cells(NamedTuple):
 
 def _unit(vectors: Floats) -> Floats:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return vectors / np.where(length > 0.0, length, 1.0)
+    unit: Floats = vectors / np.where(length > 0.0, length, 1.0)
+    return unit
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
-    return np.einsum("...k,...k->...", a, b)
+    product: Floats = np.einsum("...k,...k->...", a, b)
+    return product
 
 
 def _welded(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:

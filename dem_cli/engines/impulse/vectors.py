@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
+import math
+
 from dem_cli.engines.impulse.arrays import CENTER, SCALE, TURN
 from dem_cli.jit import kernel
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def row(a, k, c):
     """Row k of array a from column c on."""
     return a[k, c], a[k, c + 1], a[k, c + 2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def add(a, b):
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def sub(a, b):
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def times(a, s):
     return a[0] * s, a[1] * s, a[2] * s
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def along(a, d, s):
     """a + s d"""
     return a[0] + d[0] * s, a[1] + d[1] * s, a[2] + d[2] * s
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def turned(m, v):
     """m v"""
     return (
@@ -53,7 +55,7 @@ def turned(m, v):
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def turned_back(m, v):
     """m^T v"""
     return (
@@ -63,7 +65,7 @@ def turned_back(m, v):
     )
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def turn_of(placed, i):
     f = placed.frame
     return (
@@ -72,13 +74,13 @@ def turn_of(placed, i):
     )  # fmt: skip
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def to_world(placed, i, p):
     """Place of a point of body i's frame of scale 1."""
     return along(row(placed.frame, i, CENTER), turned(turn_of(placed, i), p), placed.frame[i, SCALE])
 
 
-@kernel()
+@kernel(inner=True)
 def relative(placed, a, b):
     """Body a's frame seen from body b's, both of scale 1: (m (9,), t (3,), f) with p_b = f m p_a + t."""
     ta, tb = turn_of(placed, a), turn_of(placed, b)
@@ -92,7 +94,7 @@ def relative(placed, a, b):
     return m, t, placed.frame[a, SCALE] / placed.frame[b, SCALE]
 
 
-@kernel(inline=True)
+@kernel(inline=True, inner=True)
 def placed_at(relation, p):
     """Point p of a's frame in b's, of the `relative` of a and b."""
     return along(relation[1], turned(relation[0], p), relation[2])
