@@ -39,7 +39,7 @@ def test_defaults() -> None:
         "auto",
     )
     solver = s.solver
-    assert (solver.method, solver.sweeps, solver.tolerance, solver.rest_speed) == ("pgs", 200, 1e-5, 1e-3)
+    assert (solver.method, solver.sweeps, solver.tolerance, solver.rest_speed) == ("pgs", 5000, 1e-4, 1e-3)
     assert (solver.quanta, solver.iterations, solver.correction, solver.slop, solver.max_penetration) == (
         None,
         None,
@@ -68,7 +68,7 @@ def test_defaults_of_what_is_packed() -> None:
 
 def test_energy_tracking_has_keys_of_its_own() -> None:
     solver = impulse(drop({"solver": "energy-tracking"})).solver
-    assert (solver.method, solver.quanta, solver.iterations) == ("energy-tracking", 50, 20000)
+    assert (solver.method, solver.quanta, solver.iterations) == ("energy-tracking", 50, 100000)
     assert impulse(drop({"solver": {"method": "energy-tracking", "quanta": 15}})).solver.quanta == 15
 
 

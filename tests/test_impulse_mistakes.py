@@ -209,7 +209,9 @@ EVERY = [
 ]
 
 
-@pytest.mark.parametrize(("text", "changes", "line"), EVERY, ids=lambda value: str(value)[:60])
+@pytest.mark.parametrize(
+    ("text", "changes", "line"), EVERY, ids=lambda value: getattr(value, "__name__", str(value)[:60])
+)
 def test_mistake(text: Any, changes: dict[str, Any], line: str) -> None:
     found = lines_of(text(changes))
     assert [one[: len(line) + 8] for one in found] == [f"a.toml: {line}"]

@@ -20,6 +20,7 @@ from dem_cli.state import Bools, Floats, Ints
 BESIDE = 1.2  # spacings within which the six neighbours of a cubic lattice lie, and no others
 AROUND = (2.6, 1.8, BESIDE)  # spacings within which a normal is looked for, until the particles there are flat
 FLATNESS = 0.1  # of the smallest over the middle principal component, below which particles are flat
+OPEN = 0.3  # of the sum of the ways to free places around, along a normal that is trusted
 SIDES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
 DRAWN = 20000  # cells at the surface at most, whose sides are drawn
 
@@ -48,8 +49,8 @@ class Cloud(NamedTuple):
         many, sure = len(self.points), int(self.trusted.sum())
         return (
             f"cloud {name}: {self.particles} particles {self.spacing:.4g} m apart, {many} at the surface, {sure} of these "
-            f"({sure / many:.0%}) with a trusted normal; normals of neighbours differ by {np.degrees(self.angle_median):.2g} deg in the "
-            f"median, {np.degrees(self.angle_largest):.2g} deg at most"
+            f"({sure / many:.0%}) with a trusted normal; normals of neighbours differ by {np.degrees(self.angle_median):.1f} deg in the "
+            f"median, {np.degrees(self.angle_largest):.1f} deg at most"
         )
 
 
@@ -84,13 +85,14 @@ def make_cloud(x: Floats, spacing: float | None = None, given: Floats | None = N
         k = int(np.argmin(nearest))
         raise ValueError(f"particle {k + 1} lies on another one. Give each place once")
     s = own if spacing is None else spacing
-    beside = _mean_offsets(tree, x, BESIDE * s)
+    if not 0.5 * own < s < 2.0 * own:
+        raise ValueError(
+            f"neighbours are {own:.4g} m apart, which does not fit to a spacing of {s:.4g} m. Correct it, or leave it out"
+        )
+    beside = _mean_offsets(tree, x, BESIDE * own)
     if given is None:
-        at_surface = beside[1] < 6
-        if not at_surface.any() or (beside[1] == 0).all():
-            raise ValueError(f"no particles are {s:.4g} m apart. Give the distance of neighbours as spacing")
-        chosen = np.flatnonzero(at_surface)
-        normals, trusted = _normals(tree, x, chosen, s, x.mean(axis=0))
+        chosen = np.flatnonzero(beside[1] < 6)
+        normals, trusted = _normals(tree, x, chosen, own, x.mean(axis=0))
     else:
         length = np.linalg.norm(given, axis=1)
         chosen = np.flatnonzero(length > 0.0)
@@ -98,15 +100,19 @@ def make_cloud(x: Floats, spacing: float | None = None, given: Floats | None = N
             raise ValueError("all its normals are zero. Give those of the surface, or leave nx,ny,nz out")
         normals, trusted = given[chosen] / length[chosen, None], np.ones(len(chosen), dtype=bool)
     # Half a cell outside: along a trusted normal, and else towards the corner of the cell between its open sides.
-    open_sides = -beside[0][chosen] * beside[1][chosen, None] / s
+    open_sides = -beside[0][chosen] * beside[1][chosen, None] / own
+    thin = np.zeros(len(chosen), dtype=bool)
+    if given is None:  # flat, but open on both sides of it: no normal says where outside is
+        thin = trusted & (np.einsum("pi,pi->p", open_sides, normals) < OPEN)
+        trusted = trusted & ~thin
     corner = np.where(np.linalg.norm(open_sides, axis=1, keepdims=True) > 0.1, open_sides, normals)
     points = x[chosen] + 0.5 * s * np.where(trusted[:, None], normals, corner)
     solid = cells(x, s)
-    median, largest = _differences(x[chosen][trusted], normals[trusted], BESIDE * s)
+    median, largest = _differences(x[chosen][trusted], normals[trusted], BESIDE * own)
     cloud = Cloud(
         solid, s, points, normals, trusted, _sides_of_cells(x, s), len(x), len(x) - len(chosen), median, largest, ()
     )
-    return cloud._replace(warnings=tuple(_warnings(cloud, name, own, nearest, open_sides)))
+    return cloud._replace(warnings=tuple(_warnings(cloud, name, own, nearest, int(thin.sum()))))
 
 
 def cells(x: Floats, spacing: float) -> Solid:
@@ -197,7 +203,7 @@ def _sides_of_cells(x: Floats, s: float) -> tuple[Floats, Ints]:
     return low + 0.5 * s * vertices, triangles
 
 
-def _warnings(cloud: Cloud, name: str, own: float, nearest: Floats, open_sides: Floats) -> list[str]:
+def _warnings(cloud: Cloud, name: str, own: float, nearest: Floats, thin: int) -> list[str]:
     said = []
     share = float(cloud.trusted.mean())
     if share < 0.25:
@@ -214,9 +220,8 @@ def _warnings(cloud: Cloud, name: str, own: float, nearest: Floats, open_sides: 
         said.append(
             f"neighbours are {own:.4g} m apart, the spacing is {cloud.spacing:.4g} m: cells overlap or leave gaps"
         )
-    thin = int(np.sum((np.linalg.norm(open_sides, axis=1) < 0.1) & ~cloud.trusted))
     if thin:
         said.append(
-            f"{thin} particles are open on opposite sides: a body there is one particle thick, contacts are found on one side"
+            f"{thin} particles are open on opposite sides: a body there is one particle thick, contacts are found at its particles only"
         )
     return [f"cloud {name}: {one}" for one in said]
