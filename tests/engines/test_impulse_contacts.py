@@ -323,6 +323,16 @@ def test_scales_of_both_bodies() -> None:
         np.testing.assert_allclose(a, b, atol=1e-12)
 
 
+@pytest.mark.parametrize("rise", [-0.5, -0.1, 0.1, 1.0])
+def test_sphere_at_a_sharp_edge(rise: float) -> None:
+    """Outside, though behind the plane of one of the two faces."""
+    wedge = prism([(0.0, 0.0), (2.0, 0.0), (2.0, 0.4)], [(0, 1, 2)], 2.0)
+    n = np.array([-1.0, 0.0, rise]) / np.hypot(1.0, rise)
+    found = contacts(scene([wedge, ball(0.3)], [[0, 0, 0], 0.29 * n]))
+    np.testing.assert_allclose(found.gap, [-0.01], atol=1e-12)
+    np.testing.assert_allclose(found.normal, [n], atol=1e-12)
+
+
 @pytest.mark.parametrize(("gap", "count"), [(1e-4, 0), (5e-7, 1), (-1e-3, 1)])
 def test_edges_of_octahedra(gap: float, count: int) -> None:
     """An edge across an edge of bodies whose boxes overlap, whether they touch or not."""
