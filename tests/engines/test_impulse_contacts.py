@@ -188,6 +188,13 @@ def test_sphere_with_its_centre_in_a_box() -> None:
     np.testing.assert_allclose(found.normal, [UP], atol=1e-12)
 
 
+def test_sphere_in_a_thin_plate() -> None:
+    """Deeper than the plate is thick, with its centre outside: pushed out the way it came, not through."""
+    found = contacts(scene([box([3.0, 3.0, 0.01]), ball()], [[0, 0, 0], [0.1, 0.2, 0.485]]))
+    np.testing.assert_allclose(found.gap, [-0.02], atol=1e-12)
+    np.testing.assert_allclose(found.normal, [UP], atol=1e-12)
+
+
 def test_box_on_slope() -> None:
     """Four corners at equal depth on a plane; the normal points into the wall."""
     angle = np.pi / 6
@@ -286,6 +293,68 @@ def test_action_is_reaction_and_any_attitude_is_as_good() -> None:
         np.testing.assert_array_equal(there.key, found.key)
         np.testing.assert_allclose(there.point, found.point @ turn.T + shift, atol=1e-9)
         np.testing.assert_allclose(there.normal, found.normal @ turn.T, atol=1e-9)
+
+
+def test_points_keep_their_names_while_bodies_slide() -> None:
+    """A box that slides and turns a little, and a sphere that rolls, over the diagonal of a face, and boxes of any scale alike."""
+    names = set()
+    for shift in np.linspace(-0.2, 0.2, 9):
+        given = scene(
+            [box([3.0, 3.0, 1.0]), box()],
+            [[0, 0, 0], [shift, 0.3 * shift, 1.0 - 1e-6]],
+            q=[about(UP, 0.0), about(UP, shift)],
+        )
+        names.add(tuple(contacts(given).key.tolist()))
+        rolling = scene([box([3.0, 3.0, 1.0]), ball()], [[0, 0, 0], [shift, 0.3 * shift, 1.0]])
+        names.add(tuple(contacts(rolling).key.tolist()))
+        larger = scene(given.shapes, given.bodies.x * 7.0, q=given.bodies.q, scale=[7.0, 7.0])
+        found = contacts(larger, 7e-6)
+        names.add(tuple(found.key.tolist()))
+        np.testing.assert_allclose(found.gap, -7e-6, atol=1e-11)
+    assert len(names) == 2
+    assert sorted(len(name) for name in names) == [1, 4]
+
+
+def test_scales_of_both_bodies() -> None:
+    """Half of a cube of 2 on twice a cube of 0.5 is a cube of 1 on a cube of 1."""
+    found = contacts(scene([box([2.0] * 3), box([0.5] * 3)], [[0, 0, 0], [0.3, 0.2, 1 - 1e-6]], scale=[0.5, 2.0]))
+    plain = contacts(stack((0.3, 0.2), 0.0, -1e-6))
+    for a, b in zip(found, plain, strict=True):
+        np.testing.assert_allclose(a, b, atol=1e-12)
+
+
+@pytest.mark.parametrize("rise", [-0.5, -0.1, 0.1, 1.0])
+def test_sphere_at_a_sharp_edge(rise: float) -> None:
+    """Outside, though behind the plane of one of the two faces."""
+    wedge = prism([(0.0, 0.0), (2.0, 0.0), (2.0, 0.4)], [(0, 1, 2)], 2.0)
+    n = np.array([-1.0, 0.0, rise]) / np.hypot(1.0, rise)
+    found = contacts(scene([wedge, ball(0.3)], [[0, 0, 0], 0.29 * n]))
+    np.testing.assert_allclose(found.gap, [-0.01], atol=1e-12)
+    np.testing.assert_allclose(found.normal, [n], atol=1e-12)
+
+
+@pytest.mark.parametrize(("gap", "count"), [(1e-4, 0), (5e-7, 1), (-1e-3, 1)])
+def test_edges_of_octahedra(gap: float, count: int) -> None:
+    """An edge across an edge of bodies whose boxes overlap, whether they touch or not."""
+    lower = about([0.0, 1.0, 0.0], -np.pi / 4)  # the edge between x and z up, along x
+    upper = product(about(UP, np.pi / 2), product(about([1.0, 0.0, 0.0], np.pi), lower))
+    found = contacts(scene([round_stone(0, 1.0)], [[0, 0, 0], [0.1, 0.2, np.sqrt(2.0) + gap]], q=[lower, upper]))
+    assert len(found.gap) == count
+    np.testing.assert_allclose(found.gap, [gap] * count, atol=1e-12)
+    np.testing.assert_allclose(found.normal, np.tile(UP, (count, 1)), atol=1e-9)
+    np.testing.assert_allclose(found.point, np.tile([0.1, 0.0, (np.sqrt(2.0) + gap) / 2], (count, 1)), atol=1e-9)
+
+
+def test_beside_a_sharp_wedge() -> None:
+    """A corner in front of the lower face of a wedge of 11 degrees lies behind its upper face, and touches neither."""
+    wedge = prism([(0.0, 0.0), (2.0, 0.0), (2.0, 0.4)], [(0, 1, 2)], 2.0)
+    point = mesh(
+        [[0, 0, 0], [-1, 1, -0.05], [-1, -1, -0.05], [-1, 0, -1]], [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
+    )
+    assert len(contacts(scene([wedge, point], [[0, 0, 0], [1.0, 0, -0.01]])).gap) == 0
+    found = contacts(scene([wedge, point], [[0, 0, 0], [1.0, 0, 0.01]]))
+    assert found.gap.min() == pytest.approx(-0.01, abs=1e-3)
+    assert found.normal[np.argmin(found.gap)] @ UP < -0.99
 
 
 # --- meshes and terrain
@@ -404,6 +473,14 @@ def test_valley_of_terrain() -> None:
             found.normal[rows], np.tile([sign * np.sqrt(0.5), 0, -np.sqrt(0.5)], (rows.sum(), 1)), atol=1e-9
         )
         np.testing.assert_allclose([found.point[rows, 1].min(), found.point[rows, 1].max()], [-0.3, 0.7], atol=1e-9)
+
+
+def test_nearly_flat_valley_is_one_face() -> None:
+    """Two faces that bend by less than makes an edge share a name, and a sphere on both touches one of them."""
+    ground = grid_terrain(lambda x, y: 1e-4 * np.abs(x) + 0.0 * y, 8, 8.0)
+    found = contacts(scene([ball(0.5)], [[0.0, 0.2, 0.5]], terrain=ground))
+    assert len(found.gap) == 1
+    assert found.gap[0] == pytest.approx(0.0, abs=1e-7)
 
 
 def test_ridge_of_terrain() -> None:
