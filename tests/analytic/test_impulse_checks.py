@@ -13,16 +13,17 @@ SOLVERS = ("pgs", "energy-tracking")
 
 
 def bounces(run: Run, floor: float) -> tuple[Floats, Floats]:
-    """Speeds with which body 0 leaves a floor at `floor` [m] (height of its centre there), and the times, from the steps after each bounce."""
+    """Speeds with which body 0 leaves the floor, where its centre is at `floor` [m], and the times at which it turns, in the middle of a step."""
     z, v, time = run.of("x")[:, 2], run.of("v")[:, 2], run.time
     after = np.flatnonzero((v[1:] > 0.0) & (v[:-1] < 0.0)) + 1
-    speed = np.sqrt(v[after] ** 2 + 2.0 * G * (z[after] - floor))
-    return speed, time[after] - (speed - v[after]) / G
+    return np.sqrt(v[after] ** 2 + 2.0 * G * (z[after] - floor)), 0.5 * (time[after] + time[after - 1])
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_drop_rebounds_as_in_closed_form(solver: str) -> None:
-    run = shipped("impulse-drop", f"solver={solver}")
+@pytest.mark.parametrize(("solver", "friction"), [("pgs", 0.3), ("pgs", 0.0), ("energy-tracking", 0.0)])
+@pytest.mark.parametrize("points", [0, 3, 5])
+def test_drop_rebounds_as_in_closed_form(solver: str, friction: float, points: int) -> None:
+    """Flat on 4, 13 and 29 points. Energy tracking with friction turns the box by what rounding makes of ties, and is left out."""
+    run = shipped("impulse-drop", f"solver={solver}", f"contact.friction={friction}", f"grains.face_points={points}")
     speed, time = bounces(run, 1.0)
     dt, fallen = 5e-4, np.sqrt(2.0 * 0.6 * G)
     expected = fallen * 0.5 ** np.arange(1, 5)

@@ -24,7 +24,7 @@ from dem_cli.engines.impulse.vectors import dot, plus, scaled
 from dem_cli.jit import kernel
 
 # Islands of so few contacts are solved to this share of the tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
-SMALL, FINE, FINE_SWEEPS = 64, 1e-7, 500
+SMALL, FINE, FINE_SWEEPS = 64, 1e-9, 500
 ENOUGH = 1e-2  # of the first change: larger islands are not solved to less
 
 

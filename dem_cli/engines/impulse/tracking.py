@@ -30,6 +30,7 @@ from dem_cli.jit import kernel
 
 TIE = 1e-6  # contacts this close to the extreme, as a share of the extreme at the start of the phase, are treated together
 LEFT = 1e-8  # share of the largest work below which nothing is left to be released
+ROUNDING = 1e-13  # share of the fastest approach below which speeds are rounding
 PAIRS = 50  # compressions with release at most
 GUARD = 0.05  # least n.K.(n + mu t) over n.K.n: below, sliding feeds the approach (Painleve)
 
@@ -149,6 +150,7 @@ def track_energy(first, last, i, j, rows, velocity, inverse, impulse, head, foll
         for c in range(first, last):
             start = max(start, -speed[c])
             work[c] = 0.0
+        aim = max(aim, ROUNDING * start)
         if start <= aim:
             break
         while iterations < most:
