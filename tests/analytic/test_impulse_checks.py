@@ -13,7 +13,7 @@ SOLVERS = ("pgs", "energy-tracking")
 
 
 def bounces(run: Run, floor: float) -> tuple[Floats, Floats]:
-    """Speeds with which body 0 leaves the floor, where its centre is at `floor` [m], and the times at which it turns, in the middle of a step."""
+    """Speeds with which body 0 leaves the floor, where its centre is at `floor` [m], and the times at which it turns, mid-step."""
     z, v, time = run.of("x")[:, 2], run.of("v")[:, 2], run.time
     after = np.flatnonzero((v[1:] > 0.0) & (v[:-1] < 0.0)) + 1
     return np.sqrt(v[after] ** 2 + 2.0 * G * (z[after] - floor)), 0.5 * (time[after] + time[after - 1])
