@@ -89,7 +89,7 @@ friction = 0.5
     )
     assert min(abs(run.last.bodies.x[0, 2] - half) for half in (0.5, 1.0)) < 1e-3
     assert np.abs(run.last.bodies.v).max() < 1e-6
-    assert np.diff(mechanical(run)).max() < 1e-6 * mechanical(run)[0]
+    assert np.diff(mechanical(run)).max() < 1e-8 * mechanical(run)[0]
 
 
 @pytest.mark.parametrize("count", [5, 10])

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from dem_cli.engines.impulse.rows import (
+    DRIFT,
     FRICTION,
     INVERSE,
     MATRIX,
@@ -72,7 +73,7 @@ def sweep(first, last, backwards, i, j, rows, velocity, inverse, impulse, change
         c = last - 1 - k if backwards else first + k
         row, of_i, of_j = rows[c], velocity[i[c]], velocity[j[c]]
         old = vector(impulse[c], 0)
-        new = new_impulse(row, old, relative(row, of_i, of_j))
+        new = new_impulse(row, old, plus(relative(row, of_i, of_j), 1.0, vector(row, DRIFT)))
         step = plus(new, -1.0, old)
         push(row, step, of_i, of_j, inverse[i[c]], inverse[j[c]])
         for axis in range(3):

@@ -12,10 +12,10 @@ from dem_cli.engines.impulse.vectors import across, cross, dot, plus, scaled
 from dem_cli.jit import kernel
 
 # Columns of a row: arms, normal, K and its inverse (xx, yy, zz, xy, xz, yz), n.K.n, an upper bound of t.K.t, friction,
-# restitution, and the least u.n [m/s] to be reached.
+# restitution, the least u.n [m/s] to be reached, and what is added to u in the law: half of its change by the coming drift [m/s].
 ARM_I, ARM_J, NORMAL, MATRIX, INVERSE = 0, 3, 6, 9, 15
 STIFF, STIFF_ACROSS, FRICTION, RESTITUTION, TARGET = 21, 22, 23, 24, 25
-WIDTH = 26
+DRIFT, WIDTH = 26, 29
 
 
 @kernel(inline=True, inner=True)
@@ -103,4 +103,4 @@ def fill_rows(i, j, point, normal, x, inverse, restitution, friction, rows):
         row[STIFF_ACROSS] = max(dot(t, kt), dot(s, ks)) + abs(dot(s, kt))
         row[FRICTION] = friction[c]
         row[RESTITUTION] = restitution[c]
-        row[TARGET] = 0.0
+        row[TARGET] = row[DRIFT] = row[DRIFT + 1] = row[DRIFT + 2] = 0.0

@@ -56,9 +56,10 @@ def chosen(found: Found, which: Bools) -> Found:
 class ImpulseState:
     """Arrays that move, and the constants that they move by.
 
-    last, found: the contacts of the last step, in `found` with i, j as the search has them. smallest [m]: reach of the smallest body. energies (ENERGIES,) [J], counts (COUNTS,): see `step.py`.
-    start: stored energy at the start [J]; lowest: lowest potential energy so far [J]; given: positive work so far [J]; escaped: energy
-    carried off [J]; deepest: largest penetration since the last look over the smaller body's reach, with its two bodies.
+    last, found: the contacts of the last step, in `found` with i, j as the search has them. smallest [m]: reach of the smallest body.
+    energies (ENERGIES,) [J], counts (COUNTS,): see `step.py`. start: ledger at the start; lowest: lowest potential energy so far [J]; given:
+    positive work so far [J]; escaped: energy carried off [J]; deepest: largest penetration since the last look over the smaller body's reach,
+    with its two bodies.
     """
 
     scene: Scene
@@ -108,17 +109,19 @@ class ImpulseState:
         n, moving, last, before = len(self.moving.mass), self.moving, self.last, self.found
         found = self._touching(self.search.look(moving.x[:n], moving.q, KEPT_GAP * self.smallest))
         of_i, of_j = self.materials[found.i], self.materials[found.j]
-        load = np.empty((len(found.i), 3))
+        load, left = np.empty((len(found.i), 3)), np.empty((len(found.i), 3))
         if last is not None and before is not None:
-            new = carry_over(before.i, before.j, before.key, last.load, found.i, found.j, found.key, load)
+            new = carry_over(
+                before.i, before.j, before.key, last.load, last.left, found.i, found.j, found.key, load, left
+            )
         else:
-            load[:], new = 0.0, np.ones(len(load), dtype=bool)
+            load[:], left[:], new = 0.0, 0.0, np.ones(len(load), dtype=bool)
         self.found = found
         self._watch(found)
         return Touching(
             found.i, np.where(found.j < 0, n, found.j), found.point, found.normal, found.gap,
             self.scene.restitution[of_i, of_j], self.scene.friction[of_i, of_j],
-            new, load, np.zeros_like(load), np.zeros(len(load), dtype=bool),
+            new, load, left, np.zeros_like(load), np.zeros(len(load), dtype=bool),
         )  # fmt: skip
 
     def _touching(self, near: Found) -> Found:
