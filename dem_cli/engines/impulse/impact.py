@@ -127,7 +127,7 @@ def solve_impact(
     after = np.empty((last - first, 3))
     relative_of_all(first, last, i, j, rows, velocity, after)
     for c in range(first, last):
-        along = dot(vector(after[c - first], 0), vector(rows[c], NORMAL))
+        parting = dot(vector(after[c - first], 0), vector(rows[c], NORMAL))
         met = dot(vector(impulse[c], 0), vector(rows[c], NORMAL)) > 0.0
-        rows[c, TARGET] = max(0.0, along) if met else 0.0
+        rows[c, TARGET] = max(0.0, parting) if met else 0.0
     return iterations, residual, not done

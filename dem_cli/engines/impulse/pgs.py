@@ -21,7 +21,7 @@ from dem_cli.engines.impulse.rows import (
     vector,
 )
 from dem_cli.engines.impulse.symmetric import symmetric_times
-from dem_cli.engines.impulse.vectors import dot, plus, scaled
+from dem_cli.engines.impulse.vectors import along, dot, times
 from dem_cli.jit import kernel
 
 # Islands of so few contacts are solved to this share of the tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
@@ -47,18 +47,18 @@ def new_impulse(row, old, u):
     away = dot(u, n) - row[TARGET]
     before = dot(old, n)
     if mu > 0.0:
-        still = plus(old, -1.0, symmetric_times(symmetric(row, INVERSE), plus(u, -row[TARGET], n)))
-        along = dot(still, n)
-        if along >= 0.0 and dot(still, still) - along * along <= mu * mu * along * along:
+        still = along(old, symmetric_times(symmetric(row, INVERSE), along(u, n, -row[TARGET])), -1.0)
+        pressing = dot(still, n)
+        if pressing >= 0.0 and dot(still, still) - pressing * pressing <= mu * mu * pressing * pressing:
             return still
-    along = max(0.0, before - away / row[STIFF])
+    pressing = max(0.0, before - away / row[STIFF])
     if mu <= 0.0:
-        return scaled(along, n)
-    moved = plus(u, along - before, symmetric_times(symmetric(row, MATRIX), n))
-    slip = plus(moved, -dot(moved, n), n)
-    shear = plus(plus(old, -before, n), -1.0 / row[STIFF_ACROSS], slip)
-    size, most = math.sqrt(dot(shear, shear)), mu * along
-    return plus(scaled(along, n), most / size if size > most else 1.0, shear)
+        return times(n, pressing)
+    moved = along(u, symmetric_times(symmetric(row, MATRIX), n), pressing - before)
+    slip = along(moved, n, -dot(moved, n))
+    shear = along(along(old, n, -before), slip, -1.0 / row[STIFF_ACROSS])
+    size, most = math.sqrt(dot(shear, shear)), mu * pressing
+    return along(times(n, pressing), shear, most / size if size > most else 1.0)
 
 
 @kernel(inline=True, inner=True)
@@ -73,8 +73,8 @@ def sweep(first, last, backwards, i, j, rows, velocity, inverse, impulse, change
         c = last - 1 - k if backwards else first + k
         row, of_i, of_j = rows[c], velocity[i[c]], velocity[j[c]]
         old = vector(impulse[c], 0)
-        new = new_impulse(row, old, plus(relative(row, of_i, of_j), 1.0, vector(row, DRIFT)))
-        step = plus(new, -1.0, old)
+        new = new_impulse(row, old, along(relative(row, of_i, of_j), vector(row, DRIFT), 1.0))
+        step = along(new, old, -1.0)
         push(row, step, of_i, of_j, inverse[i[c]], inverse[j[c]])
         for axis in range(3):
             impulse[c, axis] = new[axis]
@@ -113,7 +113,7 @@ def sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, toler
         elif number + 1 < most:
             for k in range(contacts):
                 c = first + k
-                more = scaled(share, vector(direction[k], 0))
+                more = times(vector(direction[k], 0), share)
                 push(rows[c], more, velocity[i[c]], velocity[j[c]], inverse[i[c]], inverse[j[c]])
                 for axis in range(3):
                     impulse[c, axis] += more[axis]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dem_cli.engines.impulse.vectors import cross, dot, plus, scaled
+from dem_cli.engines.impulse.vectors import along, cross, dot, times
 from dem_cli.jit import kernel
 
 
@@ -12,8 +12,8 @@ from dem_cli.jit import kernel
 def turned(q, a):
     """The vector a turned by the unit quaternion q: w, x, y, z."""
     u = (q[1], q[2], q[3])
-    t = scaled(2.0, cross(u, a))
-    return plus(plus(a, q[0], t), 1.0, cross(u, t))
+    t = times(cross(u, a), 2.0)
+    return along(along(a, t, q[0]), cross(u, t), 1.0)
 
 
 @kernel(inline=True, inner=True)
@@ -28,9 +28,9 @@ def after_turn(q, w, h):
     speed = math.sqrt(dot(w, w))
     half = 0.5 * h * speed
     factor = math.sin(half) / speed if speed > 0.0 else 0.5 * h
-    c, s = math.cos(half), scaled(factor, w)
+    c, s = math.cos(half), times(w, factor)
     v = (q[1], q[2], q[3])
     first = c * q[0] - dot(s, v)
-    rest = plus(plus(scaled(c, v), q[0], s), 1.0, cross(s, v))
+    rest = along(along(times(v, c), s, q[0]), cross(s, v), 1.0)
     over = 1.0 / math.sqrt(first * first + dot(rest, rest))
     return first * over, rest[0] * over, rest[1] * over, rest[2] * over

@@ -8,7 +8,7 @@ acts on j at p and -J on i, so that u changes by K J, K = (1/m_i + 1/m_j) 1 - [r
 from __future__ import annotations
 
 from dem_cli.engines.impulse.symmetric import symmetric_inverse, symmetric_times
-from dem_cli.engines.impulse.vectors import across, cross, dot, plus, scaled
+from dem_cli.engines.impulse.vectors import across, along, cross, dot, times
 from dem_cli.jit import kernel
 
 # Columns of a row: arms, normal, K and its inverse (xx, yy, zz, xy, xz, yz), n.K.n, an upper bound of t.K.t, friction,
@@ -73,7 +73,7 @@ def of_both(inverse_i, inverse_j, ri, rj, unit):
     """K times a vector."""
     turn_i = cross(symmetric_times(symmetric(inverse_i, 1), cross(ri, unit)), ri)
     turn_j = cross(symmetric_times(symmetric(inverse_j, 1), cross(rj, unit)), rj)
-    return plus(plus(scaled(inverse_i[0] + inverse_j[0], unit), 1.0, turn_i), 1.0, turn_j)
+    return along(along(times(unit, inverse_i[0] + inverse_j[0]), turn_i, 1.0), turn_j, 1.0)
 
 
 @kernel()

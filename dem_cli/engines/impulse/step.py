@@ -33,7 +33,7 @@ from dem_cli.engines.impulse.rows import (
     vector,
 )
 from dem_cli.engines.impulse.tracking import link_contacts
-from dem_cli.engines.impulse.vectors import dot, scaled
+from dem_cli.engines.impulse.vectors import dot, times
 from dem_cli.jit import kernel
 
 PROJECTION_SWEEPS = 10
@@ -151,11 +151,11 @@ def solve_step(dt, gravity, driving, moving, found, rules, energies, counts):
                 energies[WORK] += 0.5 * dt * moving.mass[k] * driving[axis] * (before[k, axis] + velocity[k, axis])
     for c in range(contacts):
         one = vector(load[c], 0)
-        along = dot(one, vector(rows[c], NORMAL))
-        across = math.sqrt(max(dot(one, one) - along * along, 0.0))
+        pressing = dot(one, vector(rows[c], NORMAL))
+        across = math.sqrt(max(dot(one, one) - pressing * pressing, 0.0))
         at = order[c]
         now = relative(rows[c], velocity[i[c]], velocity[j[c]])
-        found.sliding[at] = along > 0.0 and across >= AT_CONE * rows[c, FRICTION] * along
+        found.sliding[at] = pressing > 0.0 and across >= AT_CONE * rows[c, FRICTION] * pressing
         for axis in range(3):
             found.load[at, axis] = load[c, axis]
             found.left[at, axis] = now[axis]
@@ -266,10 +266,10 @@ def book(i, j, rows, velocity, start, hit, load, energies):
     for c in range(len(i)):
         n, u = vector(rows[c], NORMAL), vector(after[c], 0)
         one = (hit[c, 0] + load[c, 0], hit[c, 1] + load[c, 1], hit[c, 2] + load[c, 2])
-        mean = scaled(0.5, (u[0] + start[c, 0], u[1] + start[c, 1], u[2] + start[c, 2]))
-        along = dot(one, n) * dot(mean, n)
-        energies[RESTITUTION_LOSS] -= along
-        energies[FRICTION_LOSS] -= dot(one, mean) - along
+        mean = times((u[0] + start[c, 0], u[1] + start[c, 1], u[2] + start[c, 2]), 0.5)
+        pressing = dot(one, n) * dot(mean, n)
+        energies[RESTITUTION_LOSS] -= pressing
+        energies[FRICTION_LOSS] -= dot(one, mean) - pressing
 
 
 @kernel()
@@ -307,7 +307,7 @@ def move_apart(first, last, i, j, rows, goal, push_out, moving, gravity):
             n = vector(row, NORMAL)
             away = dot(relative(row, shift[i[c]], shift[j[c]]), n)
             new = max(0.0, push_out[at] + (goal[at] - away) / row[STIFF])
-            change = scaled(new - push_out[at], n)
+            change = times(n, new - push_out[at])
             push_out[at] = new
             push(row, change, shift[i[c]], shift[j[c]], moving.inverse[i[c]], moving.inverse[j[c]])
     gained = 0.0

@@ -25,7 +25,7 @@ from dem_cli.engines.impulse.rows import (
     vector,
 )
 from dem_cli.engines.impulse.symmetric import symmetric_times
-from dem_cli.engines.impulse.vectors import dot, plus, scaled
+from dem_cli.engines.impulse.vectors import along, dot, times
 from dem_cli.jit import kernel
 
 TIE = 1e-6  # contacts this close to the extreme, as a share of the extreme at the start of the phase, are treated together
@@ -45,25 +45,25 @@ def quantum(row, u, gain):
     """
     n, mu = vector(row, NORMAL), row[FRICTION]
     if mu <= 0.0:
-        return scaled(gain / row[STIFF], n)
-    slip = plus(u, -dot(u, n), n)
-    still = symmetric_times(symmetric(row, INVERSE), plus(scaled(gain, n), -1.0, slip))
-    along = dot(still, n)
-    if along > 0.0 and dot(still, still) - along * along <= mu * mu * along * along:
+        return times(n, gain / row[STIFF])
+    slip = along(u, n, -dot(u, n))
+    still = symmetric_times(symmetric(row, INVERSE), along(times(n, gain), slip, -1.0))
+    pressing = dot(still, n)
+    if pressing > 0.0 and dot(still, still) - pressing * pressing <= mu * mu * pressing * pressing:
         return still
     k = symmetric(row, MATRIX)
-    moved = plus(slip, gain / row[STIFF], symmetric_times(k, n))
-    coming = plus(moved, -dot(moved, n), n)
+    moved = along(slip, symmetric_times(k, n), gain / row[STIFF])
+    coming = along(moved, n, -dot(moved, n))
     speed = math.sqrt(dot(coming, coming))
     if speed <= 1e-12 * gain:
-        return scaled(gain / row[STIFF], n)
-    t = scaled(-1.0 / speed, coming)
+        return times(n, gain / row[STIFF])
+    t = times(coming, -1.0 / speed)
     kt = symmetric_times(k, t)
     coupling = dot(n, kt)
     divisor = row[STIFF] + mu * coupling
-    along = gain / (divisor if divisor >= GUARD * row[STIFF] else row[STIFF])
-    across = min(mu * along, max(0.0, -(dot(slip, t) + along * coupling) / dot(t, kt)))
-    return plus(scaled(along, n), across, t)
+    pressing = gain / (divisor if divisor >= GUARD * row[STIFF] else row[STIFF])
+    across = min(mu * pressing, max(0.0, -(dot(slip, t) + pressing * coupling) / dot(t, kt)))
+    return along(times(n, pressing), t, across)
 
 
 @kernel()

@@ -116,17 +116,6 @@ def set_turns(placed, x, q, n):
 
 
 @kernel(inline=True, inner=True)
-def plus(a, s, b):
-    """a + s b."""
-    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
-
-
-@kernel(inline=True, inner=True)
-def scaled(s, a):
-    return s * a[0], s * a[1], s * a[2]
-
-
-@kernel(inline=True, inner=True)
 def across(n):
     """A unit vector at right angles to the unit vector n."""
     if abs(n[0]) < 0.6:
