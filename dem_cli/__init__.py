@@ -1,4 +1,4 @@
-"""dem-cli: 2D granular mechanics from the command line.
+"""dem-cli: granular mechanics from the command line, in 2D and for rigid bodies in 3D.
 
 In a notebook: `from dem_cli import load_scenario, run_scenario, open_results`. The names are imported when they are first used,
 since `dem --help` needs none of what they bring along.

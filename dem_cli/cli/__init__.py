@@ -81,7 +81,7 @@ class LazyGroup(click.Group):
 @click.option("-q", "--quiet", is_flag=True, help="No progress on stderr, errors only.")
 @click.pass_context
 def main(ctx: click.Context, verbose: int, quiet: bool) -> None:
-    """2D granular mechanics from the command line.
+    """Granular mechanics from the command line, in 2D and for rigid bodies in 3D.
 
     A scenario (TOML) goes in, a result file (HDF5) comes out, a report says what it means:
 

@@ -257,7 +257,7 @@ class ImpulseIntegration(Table):
         float | Literal["auto"], Quantity(gt=0.0, unit="s", example="0.5 ms", words_allowed=("auto",))
     ] = key(
         "auto",
-        "time step; auto: in a step no body moves by more than a fiftieth of the smallest one at the largest speed to expect, see dem check",
+        "time step; auto: in a step no body moves by more than a twentieth of the smallest one at the largest speed to expect, see dem check",
         example="auto",
     )
 

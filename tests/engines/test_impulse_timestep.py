@@ -31,12 +31,12 @@ def test_given() -> None:
 
 
 def test_rule() -> None:
-    """A fiftieth of the smallest reach, 1.5 m x 0.5, at the speed of the fall by 1.6 m."""
+    """A twentieth of the smallest reach, 1.5 m x 0.5, at the speed of the fall by 1.6 m."""
     scenario, scene = built(drop({"grains.scale": 0.5, "container": {"gravity": "10 m/s^2"}}))
     assert smallest_size(scene) == pytest.approx(0.75)
     assert fall_height(scenario, scene) == pytest.approx(1.6)
     assert largest_speed(scenario, scene) == pytest.approx(math.sqrt(32.0))
-    assert choose_time_step(scenario, scene) == pytest.approx(0.02 * 0.75 / math.sqrt(32.0))
+    assert choose_time_step(scenario, scene) == pytest.approx(0.05 * 0.75 / math.sqrt(32.0))
 
 
 @pytest.mark.parametrize(

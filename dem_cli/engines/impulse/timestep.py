@@ -9,7 +9,7 @@ import numpy as np
 from dem_cli.rigid import Scene
 from dem_cli.scenario import ImpulseScenario, ImpulseShake
 
-MOVED = 0.02  # of the smallest body's size, in a step at the largest speed
+MOVED = 0.05  # of the smallest body's size, in a step at the largest speed
 PERIODS = 100.0  # steps at least in a period of the shaking
 
 
