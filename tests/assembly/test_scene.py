@@ -228,7 +228,10 @@ def test_bodies_that_run_out_over_the_terrain_have_escaped(tmp_path: Path) -> No
 
 
 def test_bodies_outside_of_the_container_are_refused() -> None:
-    with pytest.raises(ScenarioError, match=r"body 20 starts at \(0.5, 2, 0.1\) m, outside of what encloses the scene"):
+    with pytest.raises(
+        ScenarioError,
+        match=r"^scenario: \[grains\] position: body 20 starts at \(0.5, 2, 0.1\) m, outside of what encloses the scene",
+    ):
         scene(pour({"grains.1.position": ["0.5 m", "2 m", "0.1 m"]}))
 
 
@@ -276,7 +279,9 @@ def test_the_seed_decides() -> None:
     ids=["low", "large"],
 )
 def test_bodies_that_do_not_fit(method: str, changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(ScenarioError, match=rf"\[packing\] method = {method}: the bodies do not fit: .*{words}"):
+    with pytest.raises(
+        ScenarioError, match=rf"^scenario: \[packing\] method = {method}: the bodies do not fit: .*{words}"
+    ):
         scene(
             pour(
                 {

@@ -49,14 +49,15 @@ class ImpulseEngine:
         deep = -found.gap > state.rules.slop * state.smaller(found)
         pairs = len(set(zip(found.i[deep].tolist(), found.j[deep].tolist(), strict=True)))
         said = f"{self.name(i)} and {self.name(j)} overlap at the start by {share:.2g} of the smaller one's radius"
-        place = f"{self.scenario.path or 'scenario'}"
         if self.scenario.packing.overlaps == "refuse":
-            raise ScenarioError(f'{place}: {said}. Move them apart, or write [packing] overlaps = "separate"')
+            raise ScenarioError(
+                f'{self.scenario.origin}: {said}. Move them apart, or write [packing] overlaps = "separate"'
+            )
         before = state.moving.x.copy()
         left, i, j = state.separate(SEPARATING)
         if left > 2.0 * state.rules.slop:
             said = f"{self.name(i)} and {self.name(j)} overlap by {left:.2g} of the smaller one's radius"
-            raise ScenarioError(f"{place}: {said}, and could not be pushed apart. Give them more room")
+            raise ScenarioError(f"{self.scenario.origin}: {said}, and could not be pushed apart. Give them more room")
         moved = float(np.linalg.norm(state.moving.x - before, axis=1).max())
         state.last = state.found = None
         return [f"{said}; {pairs} such pair{'s were' if pairs > 1 else ' was'} pushed apart, by {moved:.3g} m at most"]
