@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dem_cli.engines.impulse.state import ImpulseState
+from dem_cli.engines.impulse.state import WHOLE, ImpulseState
 from dem_cli.engines.impulse.step import WORK
 from dem_cli.engines.impulse.timestep import choose_time_step
 from dem_cli.engines.motion import Ground, ground_of
@@ -40,7 +40,7 @@ class ImpulseEngine:
     def _part_bodies(self) -> list[str]:
         """Moves bodies that overlap at the start apart, or refuses them; returns what there is to tell."""
         state = self.state
-        state.look()
+        state.look(WHOLE)
         (share, i, j), state.deepest = state.deepest, (0.0, 0, 0)
         if share <= state.rules.slop:
             return []
