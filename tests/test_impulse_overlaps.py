@@ -43,6 +43,14 @@ def test_they_are_moved_apart(tmp_path: Path, step: float) -> None:
     assert min(apart) > 0.2 - 1e-3
 
 
+def test_what_a_run_leaves_is_no_overlap(tmp_path: Path) -> None:
+    """Bodies of a result file penetrate by the slop and a little more; as a packing they go over as they are."""
+    path = run_scenario(parse_scenario(row(0.2 - 1e-4, packing={"overlaps": "refuse"})), tmp_path / "row.h5")
+    with open_results(path) as results:
+        assert not results.warnings
+        assert results.frame(0).bodies.x[1, 0] == 0.2 - 1e-4
+
+
 @pytest.mark.parametrize("step", [0.19, 0.12, 0.001])
 def test_they_are_refused_if_asked(tmp_path: Path, step: float) -> None:
     with pytest.raises(ScenarioError, match=r"^scenario: body 0 \(box\) and body \d \(box\) overlap at the start by"):

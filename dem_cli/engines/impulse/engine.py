@@ -19,6 +19,7 @@ from dem_cli.scenario import ImpulseScenario, ImpulseSettle, ImpulseShake, Run
 from dem_cli.state import Floats
 
 QUIET_ROWS = 3  # rows of the series in which bodies must be at rest: one instant of a bounce may look like it
+LEFT = 1e-3  # penetration over the smaller reach that a run may leave, and that is no overlap at the start: steps take it back
 SEPARATING = 1000  # rounds in which overlapping bodies are moved apart at the start
 
 
@@ -42,11 +43,12 @@ class ImpulseEngine:
         state = self.state
         state.look(WHOLE)
         (share, i, j), state.deepest = state.deepest, (0.0, 0, 0)
-        if share <= state.rules.slop:
+        most = max(LEFT, state.rules.slop)
+        if share <= most:
             return []
         found = state.found
         assert found is not None
-        deep = -found.gap > state.rules.slop * state.smaller(found)
+        deep = -found.gap > most * state.smaller(found)
         pairs = len(set(zip(found.i[deep].tolist(), found.j[deep].tolist(), strict=True)))
         said = f"{self.name(i)} and {self.name(j)} overlap at the start by {share:.2g} of the smaller one's radius"
         if self.scenario.packing.overlaps == "refuse":
