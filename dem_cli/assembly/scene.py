@@ -77,8 +77,9 @@ def _all_inside(scenario: ImpulseScenario, bodies: Bodies, low: Floats, high: Fl
     outside = np.flatnonzero(~np.all((bodies.x >= low) & (bodies.x <= high), axis=1))
     if len(outside):
         place = "({:.4g}, {:.4g}, {:.4g}) m".format(*bodies.x[outside[0]])
+        key = "[packing] file" if outside[0] < len(scenario.stored or ()) else "[grains] position"
         raise ScenarioError(
-            f"{scenario.origin}: [grains] position: body {outside[0]} starts at {place}, outside of what encloses the scene: "
+            f"{scenario.origin}: {key}: body {outside[0]} starts at {place}, outside of what encloses the scene: "
             "it would count as escaped at once. Move it, or enlarge the container"
         )
 
