@@ -56,3 +56,14 @@ def test_they_are_refused_if_asked(tmp_path: Path, step: float) -> None:
     with pytest.raises(ScenarioError, match=r"^scenario: body 0 \(box\) and body \d \(box\) overlap at the start by"):
         run_scenario(parse_scenario(row(step, packing={"overlaps": "refuse"})), tmp_path / "row.h5")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_run_warns_that_its_bodies_may_pass_through_each_other(tmp_path: Path) -> None:
+    """As `dem check` does: at 300 m/s and 1 ms the boxes are not seen in each other."""
+    boxes = [
+        {"shape": "box", "size": "1 m", "density": "2 kg/m^3", "position": [x, "0 m", "9 m"]} for x in ("0 m", "1.2 m")
+    ]
+    boxes[0]["velocity"] = ["300 m/s", "0 m/s", "0 m/s"]
+    text = drop({"grains": boxes, "stage.0.duration": "3 ms", "integration": {"time_step": "1 ms"}})
+    with open_results(run_scenario(parse_scenario(text), tmp_path / "two.h5")) as results:
+        assert "in a step of 0.001 s the fastest body may move by 35% of the smallest" in results.warnings[0]

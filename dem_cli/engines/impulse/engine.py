@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_cli.engines.impulse.state import WHOLE, ImpulseState
 from dem_cli.engines.impulse.step import WORK
-from dem_cli.engines.impulse.timestep import choose_time_step
+from dem_cli.engines.impulse.timestep import choose_time_step, coarse
 from dem_cli.engines.motion import Ground, ground_of
 from dem_cli.engines.schedule import Schedule
 from dem_cli.errors import RunError, ScenarioError
@@ -34,7 +34,7 @@ class ImpulseEngine:
         self.stage = 0
         self.stage_started = 0.0
         self._ground_place = np.zeros(3)
-        self._warnings: list[str] = self._part_bodies()
+        self._warnings: list[str] = [*coarse(scenario, scene, self.time_step), *self._part_bodies()]
         self.state.start = self.state.energy()
         self.check: Callable[[], None] = lambda: None  # called at every output; may raise KeyboardInterrupt
 
