@@ -11,12 +11,12 @@ from dem_cli.assembly.placing import place
 from dem_cli.assembly.region import Tell
 from dem_cli.assembly.shapes3d import Made, make_shape
 from dem_cli.assembly.solids import multiply, random_quaternions
-from dem_cli.assembly.surroundings import build_planes, limits
+from dem_cli.assembly.surroundings import build_planes, limits, under
 from dem_cli.errors import ScenarioError
 from dem_cli.rigid import Bodies, Scene, Shape, Terrain
 from dem_cli.scenario import BodyKind, ImpulseScenario
 from dem_cli.scenario.stored_bodies import StoredBodies
-from dem_cli.state import Floats
+from dem_cli.state import Floats, Ints
 
 
 def build_scene(scenario: ImpulseScenario, tell: Tell | None = None) -> Scene:
@@ -52,7 +52,7 @@ def build_scene(scenario: ImpulseScenario, tell: Tell | None = None) -> Scene:
         table = scenario.terrain
         material = scenario.materials.index(table.material)
         terrain, said = read_terrain(scenario.path_of(table.file), table.file_unit, table.name, material)
-        warnings += said
+        warnings += [*said, *_buried(under(terrain, bodies.x))]
     low, high = extent(bodies, reach, scenario, terrain)
     least, most = limits(scenario.container, terrain, low, high)
     _all_inside(scenario, bodies, least, most)
@@ -70,6 +70,17 @@ def build_scene(scenario: ImpulseScenario, tell: Tell | None = None) -> Scene:
         high=most,
         warnings=tuple(warnings),
     )
+
+
+def _buried(numbers: Ints) -> list[str]:
+    """A warning of bodies that start under the terrain, which holds only what comes from above."""
+    if not len(numbers):
+        return []
+    names = ", ".join(map(str, numbers[:5])) + (", ..." if len(numbers) > 5 else "")
+    bodies = "bodies start" if len(numbers) > 1 else "body starts"
+    return [
+        f"{len(numbers)} {bodies} with the centre under the terrain, through which they fall: {names}. Start them higher"
+    ]
 
 
 def _all_inside(scenario: ImpulseScenario, bodies: Bodies, low: Floats, high: Floats) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from dem_cli.rigid import Planes, Terrain
 from dem_cli.scenario import ImpulseScenario
 from dem_cli.scenario.impulse_tables import ImpulseContainer
-from dem_cli.state import Floats
+from dem_cli.state import Floats, Ints
 
 FAR = 1000.0  # times the size of everything there is, at which bodies count as escaped where nothing holds them
 MARGIN = 0.5  # of what pictures show of planes without end, around the bodies
@@ -94,3 +94,22 @@ def limits(container: ImpulseContainer, terrain: Terrain | None, low: Floats, hi
         if container.height is not None:
             most[2] = container.height + (slack if container.lid else 0.0)
     return least, most
+
+
+def under(terrain: Terrain, x: Floats) -> Ints:
+    """Indices of the places x (n, 3) [m] that have an upward-looking triangle of the terrain above and none below them."""
+    corners = terrain.vertices[terrain.triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    up = normal[:, 2] > 0.0
+    corners, normal = corners[up], normal[up]
+    low, high = corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1)
+    found = []
+    for k, place in enumerate(x):
+        near = np.flatnonzero(np.all((low <= place[:2]) & (high >= place[:2]), axis=1))
+        sides = corners[near][:, [1, 2, 0], :2] - corners[near][:, :, :2]
+        to = place[:2] - corners[near][:, :, :2]
+        over = np.all(sides[:, :, 0] * to[:, :, 1] - sides[:, :, 1] * to[:, :, 0] >= 0.0, axis=1)
+        above = np.einsum("ta,ta->t", place - corners[near][over, 0], normal[near][over])
+        if len(above) and np.all(above < 0.0):
+            found.append(k)
+    return np.array(found, dtype=np.int64)

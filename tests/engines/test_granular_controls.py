@@ -173,6 +173,34 @@ def test_load_reaches_its_targets(x: dict[str, Any], y: dict[str, Any]) -> None:
     assert found[-1].stop_reason == "stresses and strains reached"
 
 
+@pytest.mark.parametrize(
+    ("kind", "x", "y"),
+    [
+        ("chain", {"strain": -0.0003}, {"strain": 0.0005}),
+        ("chain", {"stress": "14 kPa"}, {"strain": 0.0005}),
+        ("membrane", {"stress": "13 kPa"}, {"stress": "18 kPa"}),
+        ("membrane", {"stress": "15 kPa"}, {"strain": 0.0005}),
+    ],
+)
+def test_load_inside_other_boundaries(kind: str, x: dict[str, Any], y: dict[str, Any]) -> None:
+    """Grains in a ring, or between membranes, whose pressure is the stress across x, follow a straight way, too."""
+    found = last_stage(
+        {"kind": "load", "x": x, "y": y, "increments": 3}, **{"boundary.kind": kind, "boundary.radius": "4 mm"}
+    )
+    assert len(found) == 4
+    for k, one in enumerate(found):
+        for direction, target in enumerate((x, y)):
+            if "strain" in target:
+                assert one.strain[direction] == pytest.approx(k / 3.0 * target["strain"], abs=1e-12)
+            elif kind == "chain" or direction == 1:
+                start, end = found[0].stress[direction], 1e3 * float(target["stress"].split()[0])
+                assert one.stress[direction] == pytest.approx(start + k / 3.0 * (end - start), rel=1e-5)
+        assert one.area > 0.0
+    if kind == "membrane" and x["stress"] != "15 kPa":
+        assert found[-1].stress[0] == pytest.approx(13e3, rel=0.05)  # what the links bear is some percent of it
+    assert found[-1].stop_reason == "stresses and strains reached"
+
+
 def test_strains_go_on_from_the_start_of_the_shearing() -> None:
     """A second stage goes on where the first ended; its shear strain counts from its own start."""
     second = {**TEST, "hold": "lateral-stress", "shear_strain": 0.001, "name": "more"}

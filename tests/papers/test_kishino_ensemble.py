@@ -89,7 +89,7 @@ def test_dense_samples_are_stronger() -> None:
 def test_shipped_seed_is_like_the_papers_sample() -> None:
     """Fig. 9: void ratio 0.260, slight contraction first (up to increment 14 there), s1/s2 1.7 at the peak near increment 36, mild dilatancy."""
     found = sheared(None, shear_strain=0.03)
-    if abs(found.void_ratio - 0.2553) > 1e-4:
+    if abs(found.void_ratio - 0.2559) > 1e-4:
         pytest.skip("preparations are chaotic: with the rounding of this processor the seed makes another sample")
     assert found.void_ratio == pytest.approx(0.260, abs=0.005)
     assert 30 <= int(found.ratio.argmax()) <= 45

@@ -53,7 +53,8 @@ class Near(NamedTuple):
     """Contacts that may come to touch while no disc moves more than half a skin, and their forces at the last look.
 
     start, neighbour: half list; first, second (m,): the same as pairs; memory (COLUMNS, m); normal, shear [N], slip [m] (m,): what the slider
-    has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs. place (n, 2), box (4,): where the list was made; work
+    has cut off since the anchor. disc, side (w,): disc and wall; wall_*: as for pairs; wall_depth (w,) [m]: overlap, gaps are negative.
+    place (n, 2), box (4,): where the list was made; work
     (WORK, m): room for numbers of each pair.
     """
 
@@ -71,6 +72,7 @@ class Near(NamedTuple):
     wall_normal: np.ndarray
     wall_shear: np.ndarray
     wall_slip: np.ndarray
+    wall_depth: np.ndarray
     place: np.ndarray
     box: np.ndarray
     work: np.ndarray
@@ -81,7 +83,7 @@ def no_list(n):
     """The list of n discs before the first look."""
     ints, floats, memory = np.zeros(0, np.int32), np.zeros(0), np.zeros((COLUMNS, 0))
     return Near(
-        np.zeros(n + 1, np.int64), ints, ints, ints, memory, floats, floats, floats, ints, ints, memory, floats, floats, floats,
+        np.zeros(n + 1, np.int64), ints, ints, ints, memory, floats, floats, floats, ints, ints, memory, floats, floats, floats, floats,
         np.full((n, 2), np.inf), np.zeros(4), np.zeros((WORK, 0)),
     )  # fmt: skip
 
@@ -143,7 +145,7 @@ def renew(x, bodies, law, box, skin, old):
             memory[c, :COLUMNS], memory[c, COLUMNS] = old.wall_memory[:, seen], old.wall_normal[seen]
     return Near(
         start, neighbour, first, neighbour, carried[:, :COLUMNS].T.copy(), carried[:, COLUMNS].copy(), np.zeros(m), np.zeros(m),
-        discs, sides, memory[:, :COLUMNS].T.copy(), memory[:, COLUMNS].copy(), np.zeros(k), np.zeros(k),
+        discs, sides, memory[:, :COLUMNS].T.copy(), memory[:, COLUMNS].copy(), np.zeros(k), np.zeros(k), np.zeros(k),
         x[:, :2].copy(), box.copy(), np.empty((WORK, m)),
     )  # fmt: skip
 
@@ -197,7 +199,7 @@ def _pair_law(ex, ey, mx, my, turn, reach, anchored, normal, shear, slip, fx, fy
         t = min(max(trial, -limit), limit)
         flips += touches != (normal[c] > 0.0)
         normal[c], shear[c] = p, t
-        slip[c] = (trial - t) / kt if touches else 0.0
+        slip[c] = (trial - t) / kt if touches or anchored[c] != 0.0 else 0.0
         fx[c], fy[c] = p * nx - t * ny, p * ny + t * nx
     return flips
 
@@ -243,18 +245,20 @@ def forces(x, anchor, near, bodies, law, box, fixing, sums):
         i, side = near.disc[c], near.side[c]
         nx, ny, place = wall_of(side, box)
         overlap = nx * x[i, 0] + ny * x[i, 1] + bodies.radius[i] - place
+        near.wall_depth[c] = overlap
+        along = (x[i, 1] - anchor[i, 1]) * nx - (x[i, 0] - anchor[i, 0]) * ny + (x[i, 2] - anchor[i, 2])
+        trial = near.wall_memory[SHEAR, c] + kt * along
         if overlap <= 0.0:
             if near.wall_normal[c] > 0.0:
                 flips += 1
-            near.wall_normal[c] = near.wall_shear[c] = near.wall_slip[c] = 0.0
+            near.wall_normal[c] = near.wall_shear[c] = 0.0
+            near.wall_slip[c] = trial / kt if near.wall_memory[SHEAR, c] != 0.0 else 0.0
             gap = GAP_X if side <= RIGHT else GAP_Y
             sums[gap] = min(sums[gap], -overlap)
             continue
         if near.wall_normal[c] == 0.0:
             flips += 1
         p = kn * overlap
-        along = (x[i, 1] - anchor[i, 1]) * nx - (x[i, 0] - anchor[i, 0]) * ny + (x[i, 2] - anchor[i, 2])
-        trial = near.wall_memory[SHEAR, c] + kt * along
         limit = law.wall_friction[side] * p
         t = min(max(trial, -limit), limit)
         near.wall_normal[c], near.wall_shear[c], near.wall_slip[c] = p, t, (trial - t) / kt
@@ -286,16 +290,23 @@ def _sum_over_chain(x, near, bodies, law, box, sums):
 
 
 @kernel()
-def count_contacts(near, touching):
-    """Number of contacts that carry force on each disc, touching (n,), overwritten."""
+def count_contacts(near, touching, other):
+    """Number of contacts that carry force on each disc, touching (n,), and the other body of the last one, other (n,), walls as -1 - side.
+
+    Both are overwritten, `other` where there is a contact.
+    """
     touching[:] = 0
     for c in range(near.first.size):
         if near.normal[c] > 0.0:
-            touching[near.first[c]] += 1
-            touching[near.second[c]] += 1
+            i, j = near.first[c], near.second[c]
+            touching[i] += 1
+            touching[j] += 1
+            other[i], other[j] = j, i
     for c in range(near.disc.size):
         if near.wall_normal[c] > 0.0:
-            touching[near.disc[c]] += 1
+            i = near.disc[c]
+            touching[i] += 1
+            other[i] = -1 - near.side[c]
 
 
 @kernel(inline=True)

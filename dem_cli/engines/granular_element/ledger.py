@@ -23,13 +23,22 @@ def opened_and_closed(near, law):
 
     The force of such a contact has a kink: with the depths a and b (gaps are negative) its work is kn (b+^2 - a+^2)/2.
     """
-    excess = 0.0
-    for c in range(near.second.size):
-        old, new = near.memory[OVERLAP, c], near.work[DEPTH, c]
-        if old * new < 0.0:
-            before, after = max(old, 0.0), max(new, 0.0)
-            excess += 0.5 * law.kn * ((before + after) * (new - old) - (after - before) * (after + before))
-    return excess
+    return (
+        0.5
+        * law.kn
+        * (_kinks(near.memory[OVERLAP], near.work[DEPTH]) + _kinks(near.wall_memory[OVERLAP], near.wall_depth))
+    )
+
+
+@kernel()
+def _kinks(old, new):
+    """Sum of (a+ + b+)(b - a) - (b+^2 - a+^2) over the depths a = old, b = new that differ in sign."""
+    total = 0.0
+    for c in range(old.size):
+        if old[c] * new[c] < 0.0:
+            before, after = max(old[c], 0.0), max(new[c], 0.0)
+            total += (before + after) * (new[c] - old[c]) - (after - before) * (after + before)
+    return total
 
 
 @kernel()
@@ -38,6 +47,7 @@ def set_anchor(x, anchor, near):
     anchor[:] = x
     near.memory[SHEAR], near.memory[NORMAL], near.memory[OVERLAP] = near.shear, near.normal, near.work[DEPTH]
     near.wall_memory[SHEAR], near.wall_memory[NORMAL] = near.wall_shear, near.wall_normal
+    near.wall_memory[OVERLAP] = near.wall_depth
 
 
 @kernel()
@@ -49,13 +59,17 @@ def begin_step(near):
 
 
 @kernel()
-def lose(near):
-    """Adds to LOST what sliding since the anchor has cost: mean shear force times slip, where there was force at both ends (28)."""
+def lose(near, through):
+    """Adds to LOST what sliding since the anchor has cost: mean shear force times slip.
+
+    By (28) only where there was force at both ends; `through` a collapse, iterate by iterate, contacts that open or close count, too: what the
+    spring of one that opens had stored is lost, and without that the ledger would not close.
+    """
     for c in range(near.first.size):
-        if near.slip[c] != 0.0 and near.memory[NORMAL, c] > 0.0:
+        if near.slip[c] != 0.0 and (through or (near.memory[NORMAL, c] > 0.0 and near.normal[c] > 0.0)):
             near.memory[LOST, c] += 0.5 * (near.memory[SHEAR, c] + near.shear[c]) * near.slip[c]
     for c in range(near.disc.size):
-        if near.wall_slip[c] != 0.0 and near.wall_memory[NORMAL, c] > 0.0:
+        if near.wall_slip[c] != 0.0 and (through or (near.wall_memory[NORMAL, c] > 0.0 and near.wall_normal[c] > 0.0)):
             near.wall_memory[LOST, c] += 0.5 * (near.wall_memory[SHEAR, c] + near.wall_shear[c]) * near.wall_slip[c]
 
 

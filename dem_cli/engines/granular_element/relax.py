@@ -33,6 +33,7 @@ from dem_cli.engines.granular_element.contacts import (
     forces,
     is_stale,
     renew,
+    wall_of,
 )
 from dem_cli.engines.granular_element.ledger import lose, lost_so_far, opened_and_closed, set_anchor
 from dem_cli.jit import kernel
@@ -41,21 +42,28 @@ BALANCED, UNBALANCED, NOT_A_NUMBER, AWAY = 0, 1, 2, 3
 WALL_STEP = 0.3  # share of a servo's error that a momentum step takes
 FIRM, LOOSE = 0.1, 1.0  # added to the blocks, in units of kn, for discs with two contacts and more, and with less
 LOOK = 50  # iterations between two looks at how far discs have moved
-SOON = 4  # iterations after which blocks are made anew where contacts opened or closed
+SOON, LATER = (
+    4,
+    9,
+)  # iterations after which blocks are made anew where contacts opened or closed, and where the pace is keen
 STRAIN_PARTS = 8  # pieces of a prescribed strain where the path is followed
+WARM = 5.0  # iterations after a restart until the momentum is half of what it may be
+LEAST = 0.3  # cap of the momentum below which it begins anew from the highest
 REFRESH = 20  # iterations after which blocks are made anew though no contact opened or closed
 
 
 class Pace(NamedTuple):
     """How to iterate.
 
-    momentum: the momentum iteration, else Kishino's; step: h, or alpha; cap: of the momentum; most: iterations; follow: the slider starts
+    momentum: the momentum iteration, else Kishino's; keen: discs with one contact keep their momentum, too, which is faster along
+    smooth paths; collapses and preparation go without; step: h, or alpha; cap: of the momentum; most: iterations; follow: the slider starts
     anew from every iterate (as in the paper) and the ledger is kept iterate by iterate; accuracy [N]; stress: error of the servos over
     their scale; far [m]: way from the anchor at which a grain that is held ends the attempt; patience: iterations in which the error must
     fall by half, in square, or the momentum's cap is lowered; alpha_prime, beta, beta_prime: (10), (11).
     """
 
     momentum: bool
+    keen: bool
     step: float
     cap: float
     most: int
@@ -71,7 +79,7 @@ class Pace(NamedTuple):
 
 class Iterates(NamedTuple):
     """Work arrays: velocity, fixing, old fixing (n, 3), blocks and their inverses (n, 6), normals of the last contacts (n, 2), number of
-    contacts (n,), old load (n, 2).
+    contacts (n,) and the last one's other body (contacts.count_contacts), old load (n, 2).
     """
 
     velocity: np.ndarray
@@ -81,6 +89,7 @@ class Iterates(NamedTuple):
     inverse: np.ndarray
     last: np.ndarray
     touching: np.ndarray
+    other: np.ndarray
     old_load: np.ndarray
 
 
@@ -88,7 +97,7 @@ class Iterates(NamedTuple):
 def room_for(n):
     return Iterates(
         np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, 2)),
-        np.zeros(n, np.int64), np.zeros((n, 2)),
+        np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros((n, 2)),
     )  # fmt: skip
 
 
@@ -145,16 +154,50 @@ def _block_move(inverse, fixing, i):
 
 
 @kernel(inline=True)
-def _rolling_move(bodies, room, law, i, alpha, beta):
+def _towards(x, box, other, i):
+    """Unit normal from disc i to the body that its last contact is with."""
+    j = other[i]
+    if j < 0:
+        nx, ny, _ = wall_of(-1 - j, box)
+        return nx, ny
+    ex, ey = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1]
+    distance = math.sqrt(ex * ex + ey * ey)
+    return ex / distance, ey / distance
+
+
+@kernel(inline=True)
+def _rolling_move(x, bodies, box, room, law, keen, i, alpha, beta):
     """(11): one contact; back along its normal, and rolling about it with the body force. The last row is -1: so the contact does not slip."""
     nx, ny = room.last[i, 0], room.last[i, 1]
+    if keen:
+        nx, ny = _towards(x, box, room.other, i)
     along = -alpha * (room.fixing[i, 0] * nx + room.fixing[i, 1] * ny) / law.kn
     roll = beta * (bodies.load[i, 1] * nx - bodies.load[i, 0] * ny) / law.kn
     return along * nx - roll * ny, along * ny + roll * nx, -roll
 
 
+@kernel(inline=True)
+def _is_loaded(bodies, i):
+    """Whether a grain has weight."""
+    return bodies.load[i, 0] != 0.0 or bodies.load[i, 1] != 0.0
+
+
+@kernel(inline=True)
+def _stay_near(x, box, law, room, i):
+    """A disc with one contact and no weight keeps its momentum, or it would hold back like a viscous liquid those that push it on; but nothing
+    stops it either, so it goes no farther than out of the overlap, and ahead of the other body as far as that moves towards it.
+    """
+    v, j = room.velocity, room.other[i]
+    nx, ny = _towards(x, box, room.other, i)
+    ahead = max(-v[j, 0] * nx - v[j, 1] * ny, 0.0) if j >= 0 else 0.0
+    most = ahead + (room.fixing[i, 0] * nx + room.fixing[i, 1] * ny) / law.kn
+    over = max(-v[i, 0] * nx - v[i, 1] * ny - most, 0.0)
+    v[i, 0] += over * nx
+    v[i, 1] += over * ny
+
+
 @kernel()
-def _move(x, bodies, law, room, pace, momentum):
+def _move(x, bodies, law, box, room, pace, momentum):
     """Moves all free discs once; `momentum` is that of this iteration. The velocities are what each moved."""
     v, fixing = room.velocity, room.fixing
     for i in range(x.shape[0]):
@@ -162,21 +205,22 @@ def _move(x, bodies, law, room, pace, momentum):
         if kind == DRIVEN:
             continue
         keep, count = momentum, room.touching[i]
-        loaded = kind == GRAIN and (bodies.load[i, 0] != 0.0 or bodies.load[i, 1] != 0.0)
         if kind == GRAIN and count == 0:
             dx, dy, dq = pace.beta * bodies.load[i, 0] / law.kn, pace.beta * bodies.load[i, 1] / law.kn, 0.0
             keep = 0.0
-        elif kind == GRAIN and count == 1 and (loaded or not pace.momentum):
-            dx, dy, dq = _rolling_move(bodies, room, law, i, pace.alpha_prime, pace.beta_prime)
+        elif kind == GRAIN and count == 1 and (not pace.momentum or _is_loaded(bodies, i)):
+            dx, dy, dq = _rolling_move(x, bodies, box, room, law, pace.keen, i, pace.alpha_prime, pace.beta_prime)
             keep = 0.0
         else:
             dx, dy, dq = _block_move(room.inverse, fixing, i)
             dx, dy, dq = -pace.step * dx, -pace.step * dy, -pace.step * dq
-            if count < 2 and kind == GRAIN:
+            if count < 2 and kind == GRAIN and not pace.keen:
                 keep = 0.0
         v[i, 0] = keep * v[i, 0] + dx
         v[i, 1] = keep * v[i, 1] + (dy if kind != TIED else 0.0)
         v[i, 2] = keep * v[i, 2] + (dq if kind == GRAIN else 0.0)
+        if kind == GRAIN and count == 1 and pace.keen and not _is_loaded(bodies, i):
+            _stay_near(x, box, law, room, i)
         x[i, 0] += v[i, 0]
         x[i, 1] += v[i, 1]
         x[i, 2] += v[i, 2]
@@ -253,7 +297,7 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
             since = REFRESH
         look(x, anchor, near, bodies, law, chain, box, depth, room, sums)
         if pace.follow:
-            lose(near)
+            lose(near, True)
             if iteration > -parts:
                 ledger[FIXING] -= opened_and_closed(near, law)
                 account(
@@ -279,8 +323,10 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
             return near, AWAY, iteration, math.sqrt(worst), which, stress
         since += 1
         flips += sums[FLIPS]
-        if since > REFRESH or (flips > 0.0 and since > SOON):
-            count_contacts(near, room.touching)
+        stale = since > REFRESH or (flips > 0.0 and since > (LATER if pace.keen else SOON))
+        if pace.keen or stale:
+            count_contacts(near, room.touching, room.other)
+        if stale:
             _blocks(x, near, bodies, law, chain, box, room, pace.momentum)
             since, flips = 0, 0.0
         momentum = 0.0
@@ -304,12 +350,14 @@ def relax(x, anchor, box, goal, guess, size, near, bodies, law, chain, servos, d
             if measure < 0.5 * best:
                 best, waited = measure, 0
             elif waited > pace.patience:
-                cap, best, waited = max(1.0 - 1.6 * (1.0 - cap), 0.3), measure, 0
+                cap, best, waited = 1.0 - 1.6 * (1.0 - cap), measure, 0
+                if cap < LEAST:
+                    cap = pace.cap if pace.keen else LEAST
                 room.velocity[:] = 0.0
                 speed[:] = 0.0
                 age = 0
-            momentum = min(cap, age / (age + 3.0))
-        _move(x, bodies, law, room, pace, momentum)
+            momentum = min(cap, age / (age + (WARM if pace.keen else 3.0)))
+        _move(x, bodies, law, box, room, pace, momentum)
         for k in range(servos.number):
             speed[k] = momentum * speed[k] + (WALL_STEP if pace.momentum else 1.0) * error[k]
         move_box(box, size, servos, speed)

@@ -88,7 +88,7 @@ class Sample:
         links = look(
             self.x, self.anchor, self.near, self.bodies, self.law, self.chain, self.box, self.depth, room, sums
         )
-        count_contacts(self.near, room.touching)
+        count_contacts(self.near, room.touching, room.other)
         return View(room, sums, np.array([*stored(self.near, self.law), links]))
 
     def with_friction(self, friction: float, cohesion: float | None = None) -> None:

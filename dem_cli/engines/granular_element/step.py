@@ -17,7 +17,11 @@ from dem_cli.state import Floats, Ints
 FAR = 10.0  # a disc that moves this many times the affine displacement has collapsed
 NEAR_BY = 1e-3  # of the mean radius: no smaller move counts as far
 AMISS = 0.05  # as has a sub-step whose ledger misses this share of its usual work
-HALF = 0.5  # of the block move: more locks contacts in a cycle of opening and closing
+HALF, STEP = (
+    0.5,
+    0.6,
+)  # of the block move, while a sample is prepared and afterwards: much more locks contacts in a cycle of opening and closing
+PLAIN = 0.75  # the same without momentum
 QUIET = 10_000  # iterations, and four a disc, until a sub-step counts as a collapse
 NO_GUESS = np.empty((0, 3))
 
@@ -37,28 +41,30 @@ class Solver:
     beta_prime: float = 20.0
     most: int = 100_000
 
-    def pace(self, n: int, step: float, cap: float, most: int, *, follow: bool, far: float = math.inf) -> Pace:
+    def pace(
+        self, n: int, step: float, cap: float, most: int, *, follow: bool, far: float = math.inf, keen: bool = False
+    ) -> Pace:
         patience = int(250 + 25 * math.sqrt(n))
         return Pace(
-            self.momentum, step, cap, min(most, self.most), follow, self.accuracy, self.stress, far, patience, self.alpha_prime, self.beta,
-            self.beta_prime,
+            self.momentum, keen and self.momentum, step, cap, min(most, self.most), follow, self.accuracy, self.stress, far, patience,
+            self.alpha_prime, self.beta, self.beta_prime,
         )  # fmt: skip
 
     def quiet(self, n: int, far: float) -> list[Pace]:
         """While the path is smooth: the slider from the start of the sub-step."""
-        return [self.pace(n, HALF, _cap(n), QUIET + 4 * n, follow=False, far=far)]
+        return [self.pace(n, STEP, _cap(n), QUIET + 4 * n, follow=False, far=far, keen=True)]
 
     def collapse(self, n: int) -> list[Pace]:
-        """Through a collapse, iterate by iterate: the slider goes with it; in the end without momentum."""
+        """Through a collapse, or to equilibrium from any place, iterate by iterate: the slider goes with it; in the end without momentum."""
         return [
-            self.pace(n, HALF, _cap(n), QUIET + 4 * n, follow=True),
-            self.pace(n, 0.75, 0.0, 2 * QUIET, follow=True),
+            self.pace(n, HALF, max(1.0 - 0.55 / math.sqrt(n), 0.5), QUIET + 4 * n, follow=True),
+            self.pace(n, PLAIN, 0.0, 2 * QUIET, follow=True),
         ]
 
 
 def _cap(n: int) -> float:
     """Largest momentum for n discs; where it does not help, `relax` lowers it."""
-    return max(1.0 - 0.55 / math.sqrt(n), 0.5)
+    return max(min(1.0 - 0.55 / math.sqrt(n), 1.0 - 0.2 / math.cbrt(n)), 0.5)
 
 
 @dataclass
@@ -165,7 +171,7 @@ def quiet_step(
     far = max(FAR * affine, NEAR_BY * float(sample.bodies.radius.mean()))
     if _iterate(sample, goal, servos, solver.quiet(len(sample.x), far), done, np.zeros(LEDGER), guess):
         end = sample.look()
-        lose(sample.near)
+        lose(sample.near, False)
         _settle_up(before, sample, start, end, done, follow=None)
         if abs(done.residual) <= AMISS * usual:
             return done

@@ -13,7 +13,7 @@ def drift(h, present, x, q, velocity, inertia):
     The angular momentum L = R I R' w is kept, not w: an asymmetric body turns by the midpoint rule, q' = exp(h w_m) q with
     w_m = I(q_m)^-1 L halfway, then w' = I(q')^-1 L. present (n,): bodies that are moved. inertia (n, 3): principal moments [kg m^2].
     """
-    for k in range(len(x)):
+    for k in range(len(q)):
         if not present[k]:
             continue
         for axis in range(3):
