@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 from engine_samples import text_of
 
 import dem_cli
+from dem_cli.cli import main
 from dem_cli.errors import ResultsError
 from dem_cli.results import open_results, partial_path
 
@@ -196,3 +198,15 @@ def rows_of(path: Path) -> int:
             return results.series.rows
     except ResultsError:
         return 0
+
+
+def test_interrupted_before_there_is_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As by Ctrl-C while bodies are packed: no file is named that is not there."""
+
+    def stopped(*_: Any, **__: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dem_cli.run.run_scenario", stopped)
+    done = CliRunner().invoke(main, ["run", str(folder / "few.toml"), "-o", str(folder / "few.h5")])
+    assert done.exit_code == 130
+    assert done.stderr.splitlines()[-1] == "interrupted before anything was written"

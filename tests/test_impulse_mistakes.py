@@ -270,6 +270,13 @@ def test_no_mistake(changes: dict[str, Any]) -> None:
     assert SCHEMA.is_valid(tomllib.loads(drop(changes)))
 
 
+def test_kinds_of_bodies_without_engine_are_one_mistake() -> None:
+    (line,) = lines_of(pour({"engine": ABSENT}))
+    assert line.startswith(
+        'a.toml: engine: is missing, and [[grains]] belongs to engine = "impulse". Add engine = "impulse", or'
+    )
+
+
 def test_schema_takes_what_the_model_takes() -> None:
     for text in (drop(), pour(), parse_scenario(drop()).resolved_toml(), parse_scenario(pour()).resolved_toml()):
         assert SCHEMA.is_valid(tomllib.loads(text))

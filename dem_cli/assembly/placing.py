@@ -18,6 +18,10 @@ BATCH = 64  # places that a body tries at a time
 PROGRESS = 200  # bodies after which something is told
 
 
+class _NoRoomError(Exception):
+    """Some bodies find no place; says how many do."""
+
+
 def place(scenario: ImpulseScenario, x: Floats, reach: Floats, generator: np.random.Generator, tell: Tell) -> Floats:
     """Centres of mass (n, 3) [m] of all bodies: those of x that are NaN get a place. reach (n,) [m]: of their bounding spheres.
 
@@ -33,13 +37,14 @@ def place(scenario: ImpulseScenario, x: Floats, reach: Floats, generator: np.ran
     narrow = high - low < largest * (1.0 - 1e-9)
     if narrow.any():
         axis = "xyz"[int(np.argmax(narrow))]
-        raise _misfit(
-            packing.method, f"the largest body is up to {largest:.4g} m across, the region is smaller along {axis}"
-        )
-    if packing.method == "rejection":
-        _by_chance(x, reach, loose, (low, high), packing.gap or 0.0, packing.attempts or 1, generator, tell)
-    else:
-        _in_layers(x, reach, loose, (low, high), GAP * largest if packing.gap is None else packing.gap)
+        raise _misfit(scenario, f"the largest body is up to {largest:.4g} m across, the region is smaller along {axis}")
+    try:
+        if packing.method == "rejection":
+            _by_chance(x, reach, loose, (low, high), packing.gap or 0.0, packing.attempts or 1, generator, tell)
+        else:
+            _in_layers(x, reach, loose, (low, high), GAP * largest if packing.gap is None else packing.gap)
+    except _NoRoomError as error:
+        raise _misfit(scenario, str(error)) from None
     tell(f"{packing.method}: {len(loose)} bodies up to z = {float(np.max((x[:, 2] + reach)[loose])):.4g} m")
     return x
 
@@ -54,9 +59,10 @@ def region_of(scenario: ImpulseScenario) -> tuple[Floats, Floats]:
     return np.zeros(3), np.array([container.width, container.breadth, container.height or math.inf])
 
 
-def _misfit(method: str, why: str) -> ScenarioError:
+def _misfit(scenario: ImpulseScenario, why: str) -> ScenarioError:
     return ScenarioError(
-        f"[packing] method = {method}: the bodies do not fit: {why}. Take a larger region or container, fewer or smaller bodies, or less gap"
+        f"{scenario.origin}: [packing] method = {scenario.packing.method}: the bodies do not fit: {why}. Take a larger region or container, "
+        "fewer or smaller bodies, or less gap"
     )
 
 
@@ -76,7 +82,7 @@ def _in_layers(x: Floats, reach: Floats, loose: Ints, region: tuple[Floats, Floa
         row, column = divmod(rest, columns)
         z = low[2] + 0.5 * (cell - gap) + layer * cell
         if z + 0.5 * (cell - gap) > high[2] * (1.0 + 1e-12) + 1e-12:
-            raise _misfit("grid", f"{done} of {len(loose)} find a place below z = {high[2]:.4g} m")
+            raise _NoRoomError(f"{done} of {len(loose)} find a place below z = {high[2]:.4g} m")
         spot = np.array([low[0] + (column + 0.5) * wide[0], low[1] + (row + 0.5) * wide[1], z])
         number += 1
         if not len(fixed) or (np.linalg.norm(x[fixed] - spot, axis=1) >= reach[fixed] + 0.5 * cell).all():
@@ -112,7 +118,7 @@ def _by_chance(
             if tried < attempts:
                 continue
             if not endless:
-                raise _misfit("rejection", f"{done} of {len(order)} find a place in {attempts} attempts each")
+                raise _NoRoomError(f"{done} of {len(order)} find a place in {attempts} attempts each")
             high[2] = low[2] + RAISE * (high[2] - low[2])
             tried = 0
         there.append(k)

@@ -55,7 +55,7 @@ def build_scene(scenario: ImpulseScenario, tell: Tell | None = None) -> Scene:
         warnings += [*said, *_buried(under(terrain, bodies.x))]
     low, high = extent(bodies, reach, scenario, terrain)
     least, most = limits(scenario.container, terrain, low, high)
-    _all_inside(bodies, least, most)
+    _all_inside(scenario, bodies, least, most)
     restitution, friction = pair_tables(scenario)
     return Scene(
         groups=(*(stored.groups if stored else ()), *(kind.name for kind in scenario.grains)),
@@ -83,14 +83,15 @@ def _buried(numbers: Ints) -> list[str]:
     ]
 
 
-def _all_inside(bodies: Bodies, low: Floats, high: Floats) -> None:
+def _all_inside(scenario: ImpulseScenario, bodies: Bodies, low: Floats, high: Floats) -> None:
     """ScenarioError if a body counts as escaped before anything has moved."""
     outside = np.flatnonzero(~np.all((bodies.x >= low) & (bodies.x <= high), axis=1))
     if len(outside):
         place = "({:.4g}, {:.4g}, {:.4g}) m".format(*bodies.x[outside[0]])
+        key = "[packing] file" if outside[0] < len(scenario.stored or ()) else "[grains] position"
         raise ScenarioError(
-            f"[grains] position: body {outside[0]} starts at {place}, outside of what encloses the scene: it would count as escaped at "
-            "once. Move it, or enlarge the container"
+            f"{scenario.origin}: {key}: body {outside[0]} starts at {place}, outside of what encloses the scene: "
+            "it would count as escaped at once. Move it, or enlarge the container"
         )
 
 

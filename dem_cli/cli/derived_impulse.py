@@ -12,6 +12,7 @@ from dem_cli.assembly import build_scene
 from dem_cli.cli.derived import Spread, StagePlan, about_shaking, spread_of
 from dem_cli.engines.impulse.timestep import (
     choose_time_step,
+    coarse,
     fall_height,
     largest_speed,
     smallest_size,
@@ -23,7 +24,6 @@ from dem_cli.scenario import ImpulseScenario, ImpulseSettle, ImpulseShake, Run
 CONTACTS = 4.0  # contact points a body, for estimates only
 FRAME_BYTES, CONTACT_BYTES = 116, 140  # a body and a contact point in a frame of the result file
 ROW_BYTES, TRACK_BYTES = 8 * 62, 8 * 13  # a row of the series; a followed body in a row of the tracks
-COARSE = 0.25  # of the smallest body's size: a motion in a step that is warned of
 
 
 @dataclass(frozen=True)
@@ -165,12 +165,7 @@ def file_bytes(scenario: ImpulseScenario, scene: Scene) -> int:
 
 def _warnings(scenario: ImpulseScenario, scene: Scene, dt: float) -> list[str]:
     """What is allowed but seldom meant."""
-    said = []
-    share = dt * largest_speed(scenario, scene) / smallest_size(scene)
-    if share > COARSE:
-        said.append(
-            f"in a step of {dt:.3g} s the fastest body may move by {share:.0%} of the smallest one's size: bodies may pass through each other"
-        )
+    said = [*coarse(scenario, scene, dt)]
     if dt > scenario.output.interval:
         said.append(f"the time step of {dt:.3g} s is longer than output.interval: rows of the series shorten it")
     if scenario.container.gravity > 0.0 and not len(scene.planes) and scene.terrain is None:

@@ -44,7 +44,12 @@ def command(
         try:
             run_scenario(loaded, target, force=force, listener=progress, packing_listener=progress.packing)
         except KeyboardInterrupt:
-            progress.say(f"interrupted; what was written is in {partial_path(target)}")
+            left = partial_path(target)
+            progress.say(
+                f"interrupted; what was written is in {left}"
+                if left.exists()
+                else "interrupted before anything was written"
+            )
             raise SystemExit(INTERRUPTED) from None
         except Exception:
             if partial_path(target).exists():

@@ -54,6 +54,11 @@ class AnyScenario(Table):
         """The scenario's file, if it came from one."""
         return self._path
 
+    @property
+    def origin(self) -> str:
+        """What messages call the scenario: its file, if it came from one."""
+        return str(self._path or "scenario")
+
     def to_dict(self) -> dict[str, Any]:
         """The resolved scenario as TOML data: all defaults, quantities as strings in SI units."""
         return self.model_dump(mode="json", by_alias=True, exclude_none=True)

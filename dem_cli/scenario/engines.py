@@ -34,10 +34,30 @@ def stages_of(raw: Mapping[str, Any]) -> Mapping[str, type[Table]]:
     return {**ALL_STAGES, **((engine_of(raw) or Scenario).stage_kinds)}
 
 
+def missing_engine(raw: Mapping[str, Any]) -> Mistake | None:
+    """What to say of a scenario that names no engine, and has kinds of bodies, of which only one engine knows."""
+    if "engine" in raw or not isinstance(raw.get("grains"), list):
+        return None
+    return Mistake(
+        ("engine",),
+        'is missing, and [[grains]] belongs to engine = "impulse"',
+        'Add engine = "impulse", or write [grains] once, in single brackets',
+    )
+
+
 def unknown_engine(raw: Mapping[str, Any]) -> Mistake:
     """What to say of an engine that there is not."""
     rule = f"must be one of {', '.join(ENGINES)}"
     return Mistake(("engine",), rule, did_you_mean(str(raw.get("engine")), list(ENGINES)))
 
 
-__all__ = ["ALL_STAGES", "ENGINES", "AnyScenario", "EngineScenario", "engine_of", "stages_of", "unknown_engine"]
+__all__ = [
+    "ALL_STAGES",
+    "ENGINES",
+    "AnyScenario",
+    "EngineScenario",
+    "engine_of",
+    "missing_engine",
+    "stages_of",
+    "unknown_engine",
+]

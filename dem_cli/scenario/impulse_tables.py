@@ -293,7 +293,8 @@ class ImpulseSolver(Table):
     sweeps: Annotated[int, Whole(ge=1)] = key(5000, "sweeps at most in one solve", example=5000)
     tolerance: Positive = key(
         "1e-4 m/s",
-        "change of the contacts' velocities in a sweep, root mean square, at which a solve ends; few contacts are solved to rounding",
+        "change of the contacts' velocities in a sweep, root mean square, at which a solve ends; large groups: times their first change over "
+        "1 cm/s, if that is more; few contacts or bodies: to rounding",
         example="1e-4 m/s",
     )
     rest_speed: Positive = key("1 mm/s", "contacts that approach more slowly are no impact", example="1 mm/s")

@@ -15,7 +15,7 @@ from dem_cli import units
 from dem_cli.errors import ScenarioError
 from dem_cli.scenario import mistakes
 from dem_cli.scenario.base import AnyScenario, DiscScenario, tracked_exist
-from dem_cli.scenario.engines import EngineScenario, engine_of, stages_of, unknown_engine
+from dem_cli.scenario.engines import EngineScenario, engine_of, missing_engine, stages_of, unknown_engine
 from dem_cli.scenario.grain_file import SCALE, read_grain_file
 from dem_cli.scenario.impulse import ImpulseScenario
 from dem_cli.scenario.model import Scenario
@@ -57,10 +57,10 @@ def parse_scenario(
         raise ScenarioError(mistakes.syntax(origin, text, error)) from None
     folder = Path(folder)
     lines = apply_overrides(raw, overrides)
-    kind = engine_of(raw)
-    if kind is None:
-        loc, rule, remedy = unknown_engine(raw)
-        lines.append(mistakes.line(origin, loc, raw["engine"], rule, remedy, raw))
+    kind, missing = engine_of(raw), missing_engine(raw)
+    if kind is None or missing:
+        loc, rule, remedy = missing or unknown_engine(raw)
+        lines.append(mistakes.line(origin, loc, raw.get("engine", NOTHING), rule, remedy, raw))
         raise ScenarioError("\n".join(lines))
     _width_of_file(raw, folder, kind)
     scenario: EngineScenario | None = None

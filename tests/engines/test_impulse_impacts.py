@@ -211,6 +211,27 @@ def test_mirrored_impacts_are_mirrored(method: str) -> None:
         assert np.abs(other - one * np.r_[flip, turn]).max() < 1e-6
 
 
+def flat_landing(contacts: tuple[int, int]) -> Impact:
+    """A box of 2 m x 1 m x 2 m that meets the floor flat at 3 m/s, with a grid of contact points."""
+    a, b = (np.linspace(-half, half, n) for half, n in zip((0.95, 0.45), contacts, strict=True))
+    point = np.array([[x, y, 0.0] for x in a for y in b])
+    many, q = len(point), np.array([[1.0, 0.0, 0.0, 0.0]])
+    velocity = np.zeros((2, 6))
+    velocity[0, 2] = -3.0
+    x, down = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]), np.tile([0.0, 0.0, -1.0], (many, 1))
+    first = np.zeros(many, dtype=np.int64)
+    return Impact(
+        np.array([8000.0]), np.array([[3333.3, 5333.3, 3333.3]]), q, x, velocity, point, down, first, first + 1
+    )
+
+
+@pytest.mark.parametrize("contacts", [(2, 2), (20, 10)])
+def test_a_flat_body_lands_flat_with_any_number_of_contacts(contacts: tuple[int, int]) -> None:
+    """As a cloud does, whose face has a contact for each of its particles."""
+    found = solve(flat_landing(contacts), 0.5, 0.3, "pgs", tolerance=1e-4)
+    assert found.velocity[0] == pytest.approx([0.0, 0.0, 1.5, 0.0, 0.0, 0.0], abs=1e-6)
+
+
 def test_the_error_falls_with_the_quantum() -> None:
     """Oblique impacts with friction at several points, against much finer quanta: a quarter of the quantum, about a quarter of the error."""
     cases = [random_impact(seed, 4) for seed in range(60)]

@@ -51,7 +51,7 @@ from dem_cli.engines.impulse.vectors import (
 )
 from dem_cli.jit import kernel
 
-DEPTH = 0.25  # deepest that a point is looked for under a face, over the smaller reach
+DEPTH = 0.25  # deepest that a point is looked for under a face, over the smaller reach; of terrain always
 BORDER = 1e-6  # how far a point may lie beside a face and still be over it, over the smaller reach
 MANY = 80  # triangles and points of a pair from which on the space where it overlaps is found first
 MERGE = 4e-6  # contacts of one normal that are closer than this are one, over the smaller reach
@@ -162,7 +162,7 @@ def _features(shapes, placed, near_a, near_b, relation, found, pair, owner, marg
 
 
 @kernel(inner=True)
-def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
+def _on_surface(shapes, placed, nears, found, pair, rows, tolerance, deepest):
     """Contacts of two bodies (rows of `placed`) that are polyhedra or clouds."""
     i, j = rows
     si, sj = placed.shape[i], placed.shape[j]
@@ -171,13 +171,16 @@ def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
     spacings = shapes.size[si, SPACING] * fi, shapes.size[sj, SPACING] * fj
     spacing = max(spacings[0], spacings[1])
     reach = min(placed.frame[i, RADIUS], placed.frame[j, RADIUS])
-    below = 0.0 if placed.frame[j, RADIUS] < np.inf else DEPTH * reach
+    deepest *= reach
+    below = 0.0
+    if placed.frame[j, RADIUS] == np.inf:
+        below = deepest = DEPTH * reach
     if boxes_apart(shapes, si, sj, to_j, (tolerance + spacing + below) / fj):
         return
     border, merge = BORDER * reach, MERGE * reach
     if spacing > 0.0:
         merge = 0.25 * (min(spacings[0], spacings[1]) if min(spacings[0], spacings[1]) > 0.0 else spacing)
-    depth = _gather_both(shapes, placed, nears, rows, to_i, to_j, (tolerance + 2.0 * border, DEPTH * reach, spacing))
+    depth = _gather_both(shapes, placed, nears, rows, to_i, to_j, (tolerance + 2.0 * border, deepest, spacing))
     if depth < 0.0:
         return
     margins = (tolerance, depth, border, spacing)
@@ -191,7 +194,7 @@ def _on_surface(shapes, placed, nears, found, pair, rows, tolerance):
 
 
 @kernel(inner=True)
-def _spheres_on(shapes, placed, near, found, pair, owner, tolerance):
+def _spheres_on(shapes, placed, near, found, pair, owner, tolerance, deepest):
     """Contacts of the spheres of body owner[0] with the surface or cloud owner[1]; owner[2]: 1.0 if the spheres are i's, else -1.0."""
     a, b, _ = owner
     sa, sb = placed.shape[a], placed.shape[b]
@@ -203,7 +206,7 @@ def _spheres_on(shapes, placed, near, found, pair, owner, tolerance):
         return
     reach = min(placed.frame[a, RADIUS], placed.frame[b, RADIUS])
     if shapes.number[sb, KIND] == CLOUD:
-        depth = DEPTH * reach / placed.frame[b, SCALE]
+        depth = deepest * reach / placed.frame[b, SCALE]
         spheres_on_cloud(shapes, placed, near, relation, found, pair, owner, scaled, depth)
         return
     spheres_on_mesh(shapes, placed, near, relation, found, pair, owner, scaled, MERGE * reach)
@@ -218,13 +221,14 @@ def _near(placed, i, j, tolerance):
 
 
 @kernel()
-def find(shapes, placed, ball, ball_start, nears, walls, alive, start, neighbour, tolerance, found):
+def find(shapes, placed, ball, ball_start, nears, walls, alive, start, neighbour, tolerance, deepest, found):
     """Write all contacts with gap <= tolerance [m] into `found`; found.state[COUNT] is how many
     there are, more than it holds where it is too small.
 
     shapes: `geometry.Shapes`; placed: bodies, and the terrain as one more where there is one; ball (., 4), ball_start (n + 1,): spheres in the
     container's frame; nears: two scratch `Near`; walls (w, 6): point and unit normal towards the bodies; alive (n,) bool; start, neighbour:
-    half list of bodies that may touch. found: i; j: body > i, or -1 - w for wall w, or -1 - walls for the terrain; key: the same
+    half list of bodies that may touch; deepest: penetration up to which bodies see each other, over the
+    smaller reach. found: i; j: body > i, or -1 - w for wall w, or -1 - walls for the terrain; key: the same
     from step to step for one and the same point of the pair; point: half way between both surfaces [m]; normal: unit, from i to j; gap [m].
     Sorted by (i, j, key).
     """
@@ -245,9 +249,9 @@ def find(shapes, placed, ball, ball_start, nears, walls, alive, start, neighbour
                     spheres_on_spheres(placed, ball, ball_start, found, pair, tolerance)
                 elif ki == SPHERES or kj == SPHERES:
                     owner = (i, j, 1.0) if ki == SPHERES else (j, i, -1.0)
-                    _spheres_on(shapes, placed, nears[0], found, pair, owner, tolerance)
+                    _spheres_on(shapes, placed, nears[0], found, pair, owner, tolerance, deepest)
                 else:
-                    _on_surface(shapes, placed, nears, found, pair, (i, j), tolerance)
+                    _on_surface(shapes, placed, nears, found, pair, (i, j), tolerance, deepest)
                 sort_pair(found)
             if k == before:
                 for w in range(planes - 1, -1, -1):

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dem_cli.engines.impulse.arrays import COUNT, FRAME, RADIUS, SCALE, SPHERE0, TURN, Found, Placed
-from dem_cli.engines.impulse.contacts import find, place_spheres
+from dem_cli.engines.impulse.contacts import DEPTH, find, place_spheres
 from dem_cli.engines.impulse.found import empty_found
 from dem_cli.engines.impulse.geometry import empty_near, flatten, reach_of
 from dem_cli.engines.impulse.search import farthest_move, neighbour_list
@@ -78,8 +78,11 @@ class ContactSearch:
         self.rebuilds += 1
         return start, neighbour
 
-    def look(self, x: Floats, q: Floats, tolerance: float) -> Touching:
-        """All contacts with gap <= tolerance [m] of bodies at x (n, 3) [m], turned by the unit quaternions q (n, 4)."""
+    def look(self, x: Floats, q: Floats, tolerance: float, deepest: float = DEPTH) -> Touching:
+        """All contacts with gap <= tolerance [m] of bodies at x (n, 3) [m], turned by the unit quaternions q (n, 4).
+
+        deepest: bodies that lie deeper in each other, over the smaller one's reach, are not seen.
+        """
         n = len(self.alive)
         x, q = np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(q, dtype=np.float64)
         start, neighbour = self._neighbours(x, tolerance)
@@ -88,7 +91,7 @@ class ContactSearch:
         while True:
             find(
                 self.shapes, self.placed, self._ball, self._ball_start, self._nears, self._walls, self.alive,
-                start, neighbour, tolerance, self._found,
+                start, neighbour, tolerance, deepest, self._found,
             )  # fmt: skip
             count = int(self._found.state[COUNT])
             if count <= len(self._found.i):

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from dem_cli.engines.impulse.state import ImpulseState
+from dem_cli.engines.impulse.state import WHOLE, ImpulseState
 from dem_cli.engines.impulse.step import WORK
-from dem_cli.engines.impulse.timestep import choose_time_step
+from dem_cli.engines.impulse.timestep import choose_time_step, coarse
 from dem_cli.engines.motion import Ground, ground_of
 from dem_cli.engines.schedule import Schedule
 from dem_cli.errors import RunError, ScenarioError
@@ -19,6 +19,7 @@ from dem_cli.scenario import ImpulseScenario, ImpulseSettle, ImpulseShake, Run
 from dem_cli.state import Floats
 
 QUIET_ROWS = 3  # rows of the series in which bodies must be at rest: one instant of a bounce may look like it
+LEFT = 1e-3  # penetration over the smaller reach that a run may leave, and that is no overlap at the start: steps take it back
 SEPARATING = 1000  # rounds in which overlapping bodies are moved apart at the start
 
 
@@ -33,30 +34,32 @@ class ImpulseEngine:
         self.stage = 0
         self.stage_started = 0.0
         self._ground_place = np.zeros(3)
-        self._warnings: list[str] = self._part_bodies()
+        self._warnings: list[str] = [*coarse(scenario, scene, self.time_step), *self._part_bodies()]
         self.state.start = self.state.energy()
         self.check: Callable[[], None] = lambda: None  # called at every output; may raise KeyboardInterrupt
 
     def _part_bodies(self) -> list[str]:
         """Moves bodies that overlap at the start apart, or refuses them; returns what there is to tell."""
         state = self.state
-        state.look()
+        state.look(WHOLE)
         (share, i, j), state.deepest = state.deepest, (0.0, 0, 0)
-        if share <= state.rules.slop:
+        most = max(LEFT, state.rules.slop)
+        if share <= most:
             return []
         found = state.found
         assert found is not None
-        deep = -found.gap > state.rules.slop * state.smaller(found)
+        deep = -found.gap > most * state.smaller(found)
         pairs = len(set(zip(found.i[deep].tolist(), found.j[deep].tolist(), strict=True)))
         said = f"{self.name(i)} and {self.name(j)} overlap at the start by {share:.2g} of the smaller one's radius"
-        place = f"{self.scenario.path or 'scenario'}"
         if self.scenario.packing.overlaps == "refuse":
-            raise ScenarioError(f'{place}: {said}. Move them apart, or write [packing] overlaps = "separate"')
+            raise ScenarioError(
+                f'{self.scenario.origin}: {said}. Move them apart, or write [packing] overlaps = "separate"'
+            )
         before = state.moving.x.copy()
         left, i, j = state.separate(SEPARATING)
         if left > 2.0 * state.rules.slop:
             said = f"{self.name(i)} and {self.name(j)} overlap by {left:.2g} of the smaller one's radius"
-            raise ScenarioError(f"{place}: {said}, and could not be pushed apart. Give them more room")
+            raise ScenarioError(f"{self.scenario.origin}: {said}, and could not be pushed apart. Give them more room")
         moved = float(np.linalg.norm(state.moving.x - before, axis=1).max())
         state.last = state.found = None
         return [f"{said}; {pairs} such pair{'s were' if pairs > 1 else ' was'} pushed apart, by {moved:.3g} m at most"]

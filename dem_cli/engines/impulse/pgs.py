@@ -24,15 +24,35 @@ from dem_cli.engines.impulse.symmetric import symmetric_times
 from dem_cli.engines.impulse.vectors import along, dot, times
 from dem_cli.jit import kernel
 
-# Islands of so few contacts are solved to this share of the tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
-SMALL, FINE, FINE_SWEEPS = 64, 1e-9, 500
-ENOUGH = 1e-2  # of the first change: larger islands are not solved to less
+# Islands of so few contacts, or of so few bodies (a cloud has a contact for each particle of a face), are solved to this share of the
+# tolerance, in so many sweeps at most: flat bodies land flat, stacks stand.
+SMALL, FEW, FINE, FINE_SWEEPS = 64, 4, 1e-9, 500
+FIRST = 1e-2  # [m/s] of the first change, beyond which the aim of larger islands grows with it
+
+
+@kernel(inner=True)
+def is_small(first, last, i, j, fixed):
+    """Whether an island has at most SMALL contacts or FEW bodies; `fixed` is the number of what never moves."""
+    if last - first <= SMALL:
+        return True
+    seen, many = np.empty(FEW, np.int64), 0
+    for c in range(first, last):
+        for k in (i[c], j[c]):
+            new = k != fixed
+            for m in range(many):
+                new = new and seen[m] != k
+            if new and many == FEW:
+                return False
+            if new:
+                seen[many] = k
+                many += 1
+    return True
 
 
 @kernel(inline=True, inner=True)
-def aim_of(contacts, tolerance):
+def aim_of(small, tolerance):
     """The change of velocity [m/s] at which the solution of an island ends; one that ends below `tolerance` hit no cap either way."""
-    return tolerance * FINE if contacts <= SMALL else tolerance
+    return tolerance * FINE if small else tolerance
 
 
 @kernel(inline=True, inner=True)
@@ -91,19 +111,20 @@ def sweep_until_still(first, last, i, j, rows, velocity, inverse, impulse, toler
     and whether that is enough.
 
     impulse (c, 3) [N s], taken as applied already, and velocity (n + 1, 6) are changed in place. Ends once the change is below `tolerance`
-    [m/s] or, in larger islands, a hundredth of the first one (small ones: `aim_of`), or after `most` sweeps, which go to and fro, so that no
+    [m/s], times first change / FIRST where that is more (small islands: `aim_of`), or after `most` sweeps, which go to and fro, so that no
     contact is always first. What a sweep changes is taken for the
     gradient of a nonlinear conjugate gradient method (Silcowitz-Hansen, Niebe and Erleben 2010): a share of the last direction is added
     after it, unless changes grow. The last sweep ends on the cones.
     """
     contacts = last - first
-    aim, before, residual = aim_of(contacts, tolerance), 0.0, 0.0
+    small = is_small(first, last, i, j, len(velocity) - 1)
+    aim, before, residual = aim_of(small, tolerance), 0.0, 0.0
     change, direction = np.empty((contacts, 3)), np.zeros((contacts, 3))
     for number in range(most):
         speeds, energies = sweep(first, last, number % 2 == 1, i, j, rows, velocity, inverse, impulse, change)
         residual = math.sqrt(speeds / contacts)
-        if number == 0 and contacts > SMALL:
-            aim = max(aim, ENOUGH * residual)
+        if number == 0 and not small:
+            aim *= max(1.0, residual / FIRST)
         if residual <= aim or (number + 1 >= FINE_SWEEPS and residual <= tolerance):
             return number + 1, residual, True
         share = energies / before if before > 0.0 else 2.0

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from dem_cli.engines.impulse.contacts import DEPTH
 from dem_cli.engines.impulse.detect import ContactSearch
 from dem_cli.engines.impulse.detect import Touching as Found
 from dem_cli.engines.impulse.drift import drift, kinetic_energy, turn_inverse
@@ -43,6 +44,7 @@ QUANTA, QUANTA_AT_MOST = 50, 100000  # of energy tracking where it stands in for
 # Of the smallest body's reach: bodies further apart than this do not touch; those that touched in the step before may be further apart, so
 # that resting contacts do not flicker, while bodies that are a hair apart meet one after the other.
 GAP, KEPT_GAP = 1e-10, 1e-6
+WHOLE = 2.0  # penetration over the smaller reach that two bodies with the same centre do not exceed
 
 
 def chosen(found: Found, which: Bools) -> Found:
@@ -104,10 +106,10 @@ class ImpulseState:
         turn_inverse(moving.present, moving.q, moving.mass, moving.inertia, moving.inverse)
         return state
 
-    def look(self) -> Touching:
-        """Contacts where the bodies are now, with the load impulses that they had in the step before."""
+    def look(self, deepest: float = DEPTH) -> Touching:
+        """Contacts where the bodies are now, with the load impulses that they had in the step before. deepest: see `ContactSearch.look`."""
         n, moving, last, before = len(self.moving.mass), self.moving, self.last, self.found
-        found = self._touching(self.search.look(moving.x[:n], moving.q, KEPT_GAP * self.smallest))
+        found = self._touching(self.search.look(moving.x[:n], moving.q, KEPT_GAP * self.smallest, deepest))
         of_i, of_j = self.materials[found.i], self.materials[found.j]
         load, left = np.empty((len(found.i), 3)), np.empty((len(found.i), 3))
         if last is not None and before is not None:
@@ -165,7 +167,7 @@ class ImpulseState:
         rules = self.rules._replace(correction=1.0)
         for _ in range(most):
             self.deepest = (0.0, 0, 0)
-            touching = self.look()
+            touching = self.look(WHOLE)
             if self.deepest[0] <= 1.001 * rules.slop:
                 break
             turn_inverse(self.moving.present, self.moving.q, self.moving.mass, self.moving.inertia, self.moving.inverse)

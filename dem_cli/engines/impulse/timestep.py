@@ -10,6 +10,7 @@ from dem_cli.rigid import Scene
 from dem_cli.scenario import ImpulseScenario, ImpulseShake
 
 MOVED = 0.05  # of the smallest body's size, in a step at the largest speed
+COARSE = 0.25  # of the smallest body's size: a motion in a step that is warned of
 PERIODS = 100.0  # steps at least in a period of the shaking
 
 
@@ -37,6 +38,16 @@ def time_step_limits(scenario: ImpulseScenario, scene: Scene) -> dict[str, float
         if isinstance(stage, ImpulseShake) and stage.frequency:
             limits[f"a hundredth of the period of stage {number}"] = 1.0 / (PERIODS * stage.frequency)
     return limits
+
+
+def coarse(scenario: ImpulseScenario, scene: Scene, dt: float) -> tuple[str, ...]:
+    """The warning of a step in which bodies may pass through each other, where it is one."""
+    share = dt * largest_speed(scenario, scene) / smallest_size(scene)
+    if share <= COARSE:
+        return ()
+    return (
+        f"in a step of {dt:.3g} s the fastest body may move by {share:.0%} of the smallest one's size: bodies may pass through each other",
+    )
 
 
 def smallest_size(scene: Scene) -> float:

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from dem_cli.engines.impulse.pgs import aim_of
+from dem_cli.engines.impulse.pgs import aim_of, is_small
 from dem_cli.engines.impulse.rows import (
     FRICTION,
     INVERSE,
@@ -144,7 +144,7 @@ def track_energy(first, last, i, j, rows, velocity, inverse, impulse, head, foll
     approach, chosen, parts = np.zeros(contacts), np.zeros(contacts, np.bool_), np.zeros((contacts, 3))
     for c in range(first, last):
         speed[c] = dot(relative(rows[c], velocity[i[c]], velocity[j[c]]), vector(rows[c], NORMAL))
-    iterations, aim = 0, aim_of(last - first, tolerance)
+    iterations, aim = 0, aim_of(is_small(first, last, i, j, len(velocity) - 1), tolerance)
     for _ in range(PAIRS):
         start = 0.0
         for c in range(first, last):
