@@ -6,11 +6,13 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from impulse_runs import write_run
 from impulse_text import drop, pour
 from scenario_text import ABSENT
 
 from dem_cli.assembly import build_scene
+from dem_cli.errors import ScenarioError
 from dem_cli.rigid import Shape
 from dem_cli.scenario import ImpulseScenario, parse_scenario
 
@@ -55,3 +57,13 @@ def test_bodies_of_a_file_may_meet_other_planes(tmp_path: Path) -> None:
     found = build_scene(scenario_of(text, tmp_path))
     assert (found.groups, found.materials) == (("box",), ("box", "slope"))
     assert np.array_equal(found.bodies.x, made.bodies.x)
+
+
+def test_bodies_of_a_packing_outside_of_the_container_are_refused(tmp_path: Path) -> None:
+    made = build_scene(scenario_of(pour({"grains.1.position": ["0.95 m", "0.5 m", "0.1 m"]}), tmp_path))
+    write_run(tmp_path / "pile.h5", made, [(0.0, made.bodies)], dt=0.1)
+    text = pour({"packing": {"method": "file", "file": "pile.h5"}, "grains": ABSENT, "container.width": "0.9 m"})
+    with pytest.raises(
+        ScenarioError, match=r"^scenario: \[packing\] file: body \d+ starts at \(0\.9.*, outside of what"
+    ):
+        build_scene(scenario_of(text, tmp_path))

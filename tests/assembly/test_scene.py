@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import trimesh
 from impulse_file import write_result_file
-from impulse_runs import write_run
 from impulse_text import BOX, CLUMP, PLACED, drop, pour
 from scenario_text import ABSENT
 
@@ -234,16 +233,6 @@ def test_bodies_outside_of_the_container_are_refused() -> None:
         match=r"^scenario: \[grains\] position: body 20 starts at \(0.5, 2, 0.1\) m, outside of what encloses the scene",
     ):
         scene(pour({"grains.1.position": ["0.5 m", "2 m", "0.1 m"]}))
-
-
-def test_bodies_of_a_packing_outside_of_the_container_are_refused(tmp_path: Path) -> None:
-    made = scene(pour({"grains.1.position": ["0.95 m", "0.5 m", "0.1 m"]}))
-    write_run(tmp_path / "pile.h5", made, [(0.0, made.bodies)], dt=0.1)
-    text = pour({"packing": {"method": "file", "file": "pile.h5"}, "grains": ABSENT, "container.width": "0.9 m"})
-    with pytest.raises(
-        ScenarioError, match=r"^scenario: \[packing\] file: body \d+ starts at \(0\.9.*, outside of what"
-    ):
-        scene(text, tmp_path)
 
 
 # ------------------------------------------------------------------------------------------ packings
