@@ -38,7 +38,8 @@ def command(
 
     began = time.monotonic()
     with progress_of(loaded, settings.verbosity) as progress:
-        progress.say(f"{loaded.title}: {loaded.grain_count} grains, {len(loaded.stages)} stages, to {target}")
+        what = "bodies" if loaded.engine == "impulse" else "grains"
+        progress.say(f"{loaded.title}: {loaded.grain_count} {what}, {len(loaded.stages)} stages, to {target}")
         if is_cold():
             progress.say("compiling the kernels, once after installation: up to a minute")
         try:

@@ -68,17 +68,20 @@ def turn_inverse(present, q, mass, inertia, inverse):
             inverse[k, 6] += over * e[1] * e[2]
 
 
+@kernel(inner=True)
+def turning_energy(k, inertia, q, velocity):
+    """Kinetic energy [J] of the rotation of body k."""
+    own = turned_back((q[k, 0], q[k, 1], q[k, 2], q[k, 3]), (velocity[k, 3], velocity[k, 4], velocity[k, 5]))
+    return 0.5 * (inertia[k, 0] * own[0] ** 2 + inertia[k, 1] * own[1] ** 2 + inertia[k, 2] * own[2] ** 2)
+
+
 @kernel()
 def kinetic_energy(present, mass, inertia, q, velocity):
     """Kinetic energy [J] of the centres of mass, and of rotation."""
     moving, turning = 0.0, 0.0
     for k in range(len(q)):
-        if not present[k]:
-            continue
-        v = velocity[k]
-        moving += 0.5 * mass[k] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
-        own = turned_back((q[k, 0], q[k, 1], q[k, 2], q[k, 3]), (v[3], v[4], v[5]))
-        turning += 0.5 * (
-            inertia[k, 0] * own[0] * own[0] + inertia[k, 1] * own[1] * own[1] + inertia[k, 2] * own[2] * own[2]
-        )
+        if present[k]:
+            v = velocity[k]
+            moving += 0.5 * mass[k] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+            turning += turning_energy(k, inertia, q, velocity)
     return moving, turning

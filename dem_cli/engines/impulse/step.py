@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from dem_cli.engines.impulse.drift import turning_energy
 from dem_cli.engines.impulse.impact import back_to, solve_impact, work_done
 from dem_cli.engines.impulse.islands import split_islands
 from dem_cli.engines.impulse.pgs import sweep_until_still
@@ -276,7 +277,8 @@ def book(i, j, rows, velocity, start, hit, load, energies):
 def take_back(dt, starts, i, j, rows, gap, moving, rules, gravity):
     """Moves bodies that penetrate apart: a share `correction` of what goes beyond `slop`, less what they part by themselves in dt [s].
 
-    By displacements of least kinetic energy that close no other contact. Returns the potential energy gained [J].
+    By displacements of least kinetic energy that close no other contact. Returns the energy gained [J]: of gravity, and of rotation, as spins
+    stay.
     """
     gained = 0.0
     for k in range(len(starts) - 1):
@@ -298,7 +300,7 @@ def take_back(dt, starts, i, j, rows, gap, moving, rules, gravity):
 def move_apart(first, last, i, j, rows, goal, push_out, moving, gravity):
     """The displacements of one island, u.n >= goal (contacts,) [m] for each, by projected Gauss-Seidel.
 
-    Returns the potential energy gained [J].
+    Returns the energy gained [J], of gravity and of rotation, as spins stay.
     """
     shift = np.zeros_like(moving.velocity)
     for _ in range(PROJECTION_SWEEPS):
@@ -319,9 +321,11 @@ def move_apart(first, last, i, j, rows, goal, push_out, moving, gravity):
             for axis in range(3):
                 moving.x[k, axis] += shift[k, axis]
                 gained -= moving.mass[k] * gravity[axis] * shift[k, axis]
+            gained -= turning_energy(k, moving.inertia, moving.q, moving.velocity)
             one = (moving.q[k, 0], moving.q[k, 1], moving.q[k, 2], moving.q[k, 3])
             new_q = after_turn(one, (shift[k, 3], shift[k, 4], shift[k, 5]), 1.0)
             for axis in range(4):
                 moving.q[k, axis] = new_q[axis]
+            gained += turning_energy(k, moving.inertia, moving.q, moving.velocity)
             shift[k] = 0.0
     return gained
