@@ -142,6 +142,18 @@ def test_the_resting_pile_bears_its_weight() -> None:
     )
 
 
+def test_frames_tell_the_step_that_was_made() -> None:
+    """Impulses over it are forces: 2 ms do not divide 5 ms, so steps are of 5/3 ms, and the sphere at rest weighs what it weighs."""
+    run = written(
+        SPHERE, "grains.position=['0 m', '0 m', '10 cm']", "contact.restitution=0", "stage.duration=50 ms",
+        "integration.time_step=2 ms", "output.interval=5 ms",
+    )  # fmt: skip
+    contacts, bodies = run.last.contacts, run.last.bodies
+    assert contacts is not None
+    assert run.last.dt == pytest.approx(5e-3 / 3.0, rel=1e-9)
+    assert contacts.impulse[0, 2] / run.last.dt == pytest.approx(-bodies.mass[0] * G, rel=1e-9)
+
+
 def test_same_bits_twice() -> None:
     one, other = (shipped("impulse-pour", "grains.count=20", "stage.limit=1 s").last.bodies for _ in range(2))
     for name in ("x", "q", "v", "w"):

@@ -160,7 +160,8 @@ class ImpulseEngine:
         put_in = start.kinetic + start.rotational + max(start.potential - state.lowest, 0.0) + state.given
         heavy = due != {"tracks"}
         return BodyFrame(
-            step=state.steps, time=state.time, dt=self.time_step, stage=self.stage, bodies=state.bodies(), ground=motion, energy=energy,
+            step=state.steps, time=state.time, dt=state.dt or self.time_step, stage=self.stage, bodies=state.bodies(), ground=motion,
+            energy=energy,
             residual=energy.stored + energy.lost - energy.projection - energy.work - start.stored, energy_in=put_in,
             solving=state.solving("series" in due), due=due, contacts=state.contacts() if heavy else None,
         )  # fmt: skip

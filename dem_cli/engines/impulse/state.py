@@ -58,7 +58,8 @@ def chosen(found: Found, which: Bools) -> Found:
 class ImpulseState:
     """Arrays that move, and the constants that they move by.
 
-    last, found: the contacts of the last step, in `found` with i, j as the search has them. smallest [m]: reach of the smallest body.
+    dt: the last step [s]. last, found: the contacts of that step, in `found` with i, j as the search has them.
+    smallest [m]: reach of the smallest body.
     energies (ENERGIES,) [J], counts (COUNTS,): see `step.py`. start: ledger at the start; lowest: lowest potential energy so far [J]; given:
     positive work so far [J]; escaped: energy carried off [J]; deepest: largest penetration since the last look over the smaller body's reach,
     with its two bodies.
@@ -72,6 +73,7 @@ class ImpulseState:
     smallest: float
     materials: Ints
     time: float = 0.0
+    dt: float = 0.0
     steps: int = 0
     last: Touching | None = None
     found: Found | None = None
@@ -160,6 +162,7 @@ class ImpulseState:
         drift(0.5 * dt, moving.present, moving.x, moving.q, moving.velocity, moving.inertia)
         self.steps += 1
         self.time += dt
+        self.dt = dt
 
     def separate(self, most: int) -> tuple[float, int, int]:
         """Moves bodies apart until none penetrates by more than the slop; returns the largest penetration left over the smaller body's reach,
