@@ -1,0 +1,149 @@
+"""The manifest of a sweep, `sweep.toml` in its folder: the axes, and each member's settings, result file and what became of it.
+
+The result files are what counts: a member is done if its file is complete and of its hash, whatever the manifest says of it. So a manifest that is
+lost or behind costs nothing but the reasons of failures.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+
+from dem_cli.errors import ResultsError
+
+NAME = "sweep.toml"
+FORMAT, FORMAT_VERSION = "dem-cli sweep", 1
+HEAD = "# Written by dem sweep, read by dem report. Result files lie beside it; it can be made anew from them.\n"
+State = Literal["waiting", "done", "failed"]
+Kind = Literal["grid", "zip", "scenario"]
+
+
+@dataclass(frozen=True)
+class SweepAxis:
+    """What varies: `keys` of the scenario, and for each point of the axis a value of every key, as TOML has them.
+
+    kind: grid, one key whose values are combined with all others; zip, keys that go together; scenario, the key is "scenario" and its values
+    are names of scenario files.
+    """
+
+    keys: tuple[str, ...]
+    points: tuple[tuple[Any, ...], ...]
+    kind: Kind = "grid"
+
+
+@dataclass(frozen=True)
+class Member:
+    """One run of a sweep. file: its result file, within the sweep's folder. settings: key -> value as on the axes.
+
+    reason: why it failed. seconds: wall time of the run, NaN if unknown. program: version that made or refused it.
+    """
+
+    name: str
+    file: str
+    hash: str
+    settings: Mapping[str, Any]
+    state: State = "waiting"
+    reason: str = ""
+    seconds: float = float("nan")
+    program: str = ""
+
+    def with_state(self, state: State, **known: Any) -> Member:
+        return replace(self, state=state, **known)
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """A sweep. scenario: name of the file that it was started from. former: result files of members that the sweep no longer has."""
+
+    title: str
+    scenario: str
+    axes: tuple[SweepAxis, ...]
+    members: tuple[Member, ...]
+    former: tuple[str, ...] = ()
+    folder: Path = field(default=Path(), compare=False)
+
+    def path(self, member: Member) -> Path:
+        """Where a member's result file lies."""
+        return self.folder / member.file
+
+
+def is_sweep(path: Path | str) -> bool:
+    """Whether a path is the folder of a sweep, or its manifest."""
+    path = Path(path)
+    return (path / NAME).is_file() or (path.name == NAME and path.is_file())
+
+
+def read_manifest(path: Path | str) -> Manifest:
+    """The manifest in a folder, or the file itself. ResultsError, in one line, if there is none or it cannot be read."""
+    path = Path(path)
+    file = path if path.name == NAME else path / NAME
+    try:
+        with file.open("rb") as handle:
+            raw = tomllib.load(handle)
+    except FileNotFoundError:
+        raise ResultsError(f"{path}: is no folder of a sweep; it has no {NAME}") from None
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ResultsError(
+            f"{file}: cannot be read ({error}). Move it away and run dem sweep again: it is made anew from the result files"
+        ) from None
+    if raw.get("format") != FORMAT or not isinstance(raw.get("format_version"), int):
+        raise ResultsError(f"{file}: is no manifest of a sweep")
+    if raw["format_version"] > FORMAT_VERSION:
+        raise ResultsError(f"{file}: written by a newer dem-cli (format {raw['format_version']}); update dem-cli")
+    try:
+        return Manifest(
+            title=str(raw["title"]),
+            scenario=str(raw["scenario"]),
+            axes=tuple(
+                SweepAxis(tuple(axis["keys"]), tuple(tuple(point) for point in axis["points"]), axis["kind"])
+                for axis in raw.get("axis", [])
+            ),
+            members=tuple(Member(**member) for member in raw.get("member", [])),
+            former=tuple(raw.get("former", [])),
+            folder=file.parent,
+        )
+    except (KeyError, TypeError) as error:
+        raise ResultsError(f"{file}: is damaged ({error}). Move it away and run dem sweep again") from None
+
+
+def write_manifest(manifest: Manifest) -> None:
+    """Write it into its folder, in one step: whoever reads sees the old one or the new one. OSError if that fails; the old one stays."""
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "title": manifest.title,
+        "scenario": manifest.scenario,
+        **({"former": list(manifest.former)} if manifest.former else {}),
+        "axis": [
+            {"keys": list(axis.keys), "kind": axis.kind, "points": [list(point) for point in axis.points]}
+            for axis in manifest.axes
+        ],
+        "member": [_of_member(member) for member in manifest.members],
+    }
+    target = manifest.folder / NAME
+    fresh = target.with_name(f".{NAME}.{os.getpid()}")
+    try:
+        with fresh.open("w", encoding="utf-8") as handle:
+            handle.write(HEAD + tomli_w.dumps(content))
+            handle.flush()
+            os.fsync(handle.fileno())
+        os.replace(fresh, target)
+    except OSError:
+        fresh.unlink(missing_ok=True)
+        raise
+
+
+def _of_member(member: Member) -> dict[str, Any]:
+    """Without what is not known."""
+    known = {"name": member.name, "file": member.file, "hash": member.hash, "state": member.state}
+    more = {"reason": member.reason, "program": member.program}
+    seconds = {"seconds": member.seconds} if member.seconds == member.seconds else {}
+    return (
+        known | {name: value for name, value in more.items() if value} | seconds | {"settings": dict(member.settings)}
+    )
