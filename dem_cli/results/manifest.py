@@ -1,7 +1,7 @@
-"""The manifest of a sweep, `sweep.toml` in its folder: the axes, and each member's settings, result file and what became of it.
+"""The manifest of a sweep, `sweep.toml` in its folder: the axes, each member's settings, result file, and what became of it.
 
-The result files are what counts: a member is done if its file is complete and of its hash, whatever the manifest says of it. So a manifest that is
-lost or behind costs nothing but the reasons of failures.
+The result files are what counts: a member is done if its file is complete and of its hash, whatever the manifest says.
+So a manifest that is lost or behind costs nothing but the reasons of failures.
 """
 
 from __future__ import annotations
