@@ -42,7 +42,7 @@ Listener = Callable[[Frame | Increment | BodyFrame, Mapping[str, float] | None],
 
 @dataclass(frozen=True)
 class Preparation:
-    """The first stages of a run that are over: their result file, which is not changed, and the engine's state after them."""
+    """The first stages of a run, over: their result file, which is not changed, and the engine's state after them."""
 
     file: Path
     state: bytes

@@ -77,8 +77,8 @@ class Sweep(Table):
     )
     grid: Annotated[Points, Varied()] = key(
         {},
-        "every value of each with every value of the others: keys as for --set, each with a list of values, or with a range { from, to, count } or "
-        '{ from, to, step }; spacing = "log" for equal ratios',
+        "every value of each with every value of the others: keys as for --set, each with a list of values, or a range "
+        '{ from, to, count } or { from, to, step }; spacing = "log" for equal ratios',
         example={"stage.shake.amplitude": ["400 gal", "800 gal"]},
     )
     zip: Annotated[Points, Varied("grains.count")] = key(
