@@ -100,7 +100,7 @@ class TimePace(Pace):
         total = sum(stage.longest for stage in self.scenario.stages[self.begin : self.until])
         before = sum(stage.longest for stage in self.scenario.stages[self.begin : state.stage])
         here = self.scenario.stages[state.stage].longest - (self._end(state) - state.time)
-        return (before + here) / total
+        return min(max((before + here) / total, 0.0), 1.0)
 
 
 class IncrementPace(Pace):

@@ -113,7 +113,7 @@ def _run(settings: Settings, plan: Plan, store: Store, jobs: int, scheduler: str
         from dem_cli.sweep.cluster import ClusterWorkers
 
         workers = ClusterWorkers(scheduler, store.token)
-        where = f"{scheduler}, {workers.threads} workers"
+        where = f"{scheduler}, which has room for {workers.at_once} at a time"
     else:
         workers = LocalWorkers(jobs)
         where = f"{jobs} process{'es' if jobs > 1 else ''}"

@@ -53,6 +53,8 @@ class Seeds:
     """Annotation of seeds: a list of them, or how many, which are then 1, 2, ..."""
 
     def validate(self, value: Any) -> tuple[int, ...]:
+        if value == ():  # the default
+            return ()
         if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= MOST:
             return tuple(range(1, value + 1))
         if isinstance(value, list) and value and all(_is_whole(one) and one >= 0 for one in value):

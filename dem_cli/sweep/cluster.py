@@ -9,10 +9,12 @@ from __future__ import annotations
 import contextlib
 import functools
 import os
+import queue
 import secrets
 import shutil
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
@@ -28,6 +30,7 @@ from dem_cli.sweep.process import Tell, WorkerProcess
 from dem_cli.sweep.task import Answer, Task
 
 CONNECT = 15.0  # s until a scheduler must have answered
+COUNT_EVERY = 2.0  # s between two counts of workers
 DEEP = "a/b/c/d/e/f"  # so that a scenario's ../../ stays within a worker's own folder
 TOPIC = "dem-sweep"
 
@@ -64,11 +67,12 @@ class ClusterWorkers:
         self._token = (str(token.resolve()), token.read_text())
         self._name = f"{TOPIC}-{secrets.token_hex(6)}"
         self._ships = False
+        self._counted, self._threads = -COUNT_EVERY, 0
         self._tells: dict[str, Tell] = {}
         self._lock = threading.Lock()
         self._client = _connect(address)
         try:
-            self._check_programs()
+            self._refuse_others(program_identity())
             self._client.subscribe_topic(self._name, self._heard)
         except BaseException:
             self._client.close()
@@ -77,12 +81,15 @@ class ClusterWorkers:
     @property
     def slots(self) -> int:
         """As many tasks as there are threads, and some in reserve, so that no worker waits for the next one."""
-        return self.threads + min(self.threads, 8) or 1
+        return self.at_once + min(self.at_once, 8) or 1
 
     @property
-    def threads(self) -> int:
-        """Tasks that the cluster does at a time."""
-        return int(sum(self._client.nthreads().values()))
+    def at_once(self) -> int:
+        """Threads of all workers, which may come and go; as they were some seconds ago."""
+        now = time.monotonic()
+        if now - self._counted > COUNT_EVERY:
+            self._counted, self._threads = now, int(sum(self._client.nthreads().values()))
+        return self._threads
 
     def submit(self, task: Task, tell: Tell) -> Future[Answer]:
         with self._lock:
@@ -126,9 +133,8 @@ class ClusterWorkers:
         if tell:
             tell(share, words)
 
-    def _check_programs(self) -> None:
-        """Workers that come later are asked by their first task."""
-        ours = program_identity()
+    def _refuse_others(self, ours: str) -> None:
+        """Workers that run another program than ours. Those that come later are asked by their first task."""
         try:
             theirs: dict[str, str] = self._client.run(program_identity)
         except Exception as error:  # the worker has no dem-cli, or one that is older than this question
@@ -154,9 +160,12 @@ class ClusterWorkers:
 def _connect(address: str) -> Any:
     try:
         from distributed import Client
+        from distributed.comm.addressing import parse_address
+        from distributed.comm.registry import get_backend
     except ImportError:
         raise ClusterError("--scheduler needs Dask: pip install 'dem-cli[cluster]', here and on the workers") from None
     try:
+        get_backend(parse_address(address)[0])  # a client with an address of no kind would not let go for half a minute
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__
@@ -257,11 +266,18 @@ def _in_process(task: Task, sweep: str) -> Answer:
     worker = get_worker()
     stop = Event(sweep, client=worker._get_client())
     asked = _Seldom(stop.is_set)
-    process = WorkerProcess()
+    try:
+        process = _idle.get_nowait()
+    except queue.Empty:
+        process = WorkerProcess()
     try:
         return process.do(task, lambda share, words: worker.log_event(sweep, (task.key, share, words)), asked)
     finally:
-        process.close()
+        _idle.put(process)
+
+
+# Of a Dask worker, between two tasks; one that gets no more ends by itself.
+_idle: queue.SimpleQueue[WorkerProcess] = queue.SimpleQueue()
 
 
 class _Seldom:

@@ -52,7 +52,7 @@ class Tally:
     failed: dict[str, str] = field(default_factory=dict)  # name -> reason
     running: list[Job] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)  # wall times of members that were run
-    slots: int = 1
+    at_once: int = 1
 
     @property
     def open(self) -> int:
@@ -66,7 +66,7 @@ class Tally:
             return math.inf
         mean = sum(self.seconds) / len(self.seconds)
         begun = sum(job.share for job in self.running if job.member)
-        return mean * max(self.open - begun, 0.0) / max(min(self.slots, self.open), 1)
+        return mean * max(self.open - begun, 0.0) / max(min(self.at_once, self.open), 1)
 
 
 class Watcher(Protocol):
@@ -89,7 +89,7 @@ class Sweeping:
         self._recorded = 0.0
         self._full = ""
         self._records = {one.hash: one for one in store.manifest.members if one.hash}
-        self.tally = Tally(len(store.manifest.members), slots=workers.slots)
+        self.tally = Tally(len(store.manifest.members), at_once=workers.at_once)
 
     # -- what there is to do ----------------------------------------------------------------------------------------
 
@@ -153,7 +153,7 @@ class Sweeping:
                     self._take(self._flights.pop(future), future)
                 check()
                 self._launch()
-                self.tally.running = list(self._flights.values())
+                self.tally.running, self.tally.at_once = list(self._flights.values()), self.workers.at_once
                 self.watcher.show(self.tally)
                 self._record()
                 if not self._flights and self._jobs:  # all that is left is being done by another sweep

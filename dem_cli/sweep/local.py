@@ -13,10 +13,13 @@ from dem_cli.sweep.task import Answer, Task
 
 
 class Workers(Protocol):
-    """Where tasks are done. slots: how many at a time."""
+    """Where tasks are done. slots: how many to hand out; at_once: how many of them are worked on at a time."""
 
     @property
     def slots(self) -> int: ...
+
+    @property
+    def at_once(self) -> int: ...
 
     def submit(self, task: Task, tell: Tell) -> Future[Answer]:
         """tell: told how far the task is; called from another thread."""
@@ -33,7 +36,7 @@ class LocalWorkers:
     """As many processes as asked for, each of which does one task at a time on one core."""
 
     def __init__(self, jobs: int, process: Callable[[], WorkerProcess] = WorkerProcess) -> None:
-        self.slots = jobs
+        self.slots = self.at_once = jobs
         self._stopped = threading.Event()
         self._idle: queue.SimpleQueue[WorkerProcess] = queue.SimpleQueue()
         for _ in range(jobs):

@@ -24,6 +24,7 @@ from dem_cli.results.provenance import program_identity
 from dem_cli.sweep.task import Answer, Task
 
 TELL_EVERY = 0.5  # s between two words on how far a member is
+IDLE = 60.0  # s without a task after which the process ends; a new one is started when there is work again
 
 
 class Told:
@@ -119,7 +120,7 @@ def _line(error: BaseException) -> str:
 
 
 def serve(tasks: TextIO, out: TextIO) -> None:
-    """Answer tasks until there are no more; the last one is interrupted where the input ends before it does."""
+    """Answer tasks until none has come for a while; the last one is interrupted where the input ends before it does."""
     waiting: queue.Queue[str | None] = queue.Queue()
     busy = threading.Event()
 
@@ -134,7 +135,13 @@ def serve(tasks: TextIO, out: TextIO) -> None:
         print(json.dumps(words), file=out, flush=True)
 
     threading.Thread(target=listen, daemon=True).start()
-    while (line := waiting.get()) is not None:
+    while True:
+        try:
+            line = waiting.get(timeout=IDLE)
+        except queue.Empty:
+            return
+        if line is None:
+            return
         busy.set()
         answer = perform(Task.from_json(line), lambda share, words: say(share=share, words=words))
         busy.clear()
