@@ -37,7 +37,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "pace": STARTS,
     "run": STARTS | {"assembly", "engines", "results", "analysis", "interrupts"},
     "sweep": STARTS | {"run", "results", "pace"},
-    "cli": STARTS | {"assembly", "engines", "results", "analysis", "report", "run", "sweep", "jit", "pace"},
+    "cli": STARTS
+    | {"assembly", "engines", "results", "analysis", "report", "run", "sweep", "jit", "pace", "interrupts"},
     "__init__": {"errors", "scenario", "results", "run"},
     "__main__": {"cli"},
 }

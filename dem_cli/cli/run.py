@@ -41,6 +41,8 @@ def command(
     with Progress(loaded, settings.verbosity) as progress:
         what = "bodies" if loaded.engine == "impulse" else "grains"
         progress.say(f"{loaded.title}: {loaded.grain_count} {what}, {len(loaded.stages)} stages, to {target}")
+        if loaded.sweep:
+            progress.say("its table [sweep] is left aside: dem sweep runs that")
         if is_cold():
             progress.say("compiling the kernels, once after installation: up to a minute")
         try:

@@ -27,6 +27,7 @@ class Varied:
     """Annotation of a table of keys with a list of values each; a range stands for its values."""
 
     example: str = "stage.shake.amplitude"
+    words: ClassVar[str] = "table of: list of values, or range"
 
     def validate(self, value: Any) -> Points:
         if not isinstance(value, dict):
@@ -51,6 +52,8 @@ class Varied:
 @dataclass(frozen=True)
 class Seeds:
     """Annotation of seeds: a list of them, or how many, which are then 1, 2, ..."""
+
+    words: ClassVar[str] = "whole number from 1, or list of: whole number from 0"
 
     def validate(self, value: Any) -> tuple[int, ...]:
         if value == ():  # the default
