@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -256,11 +256,12 @@ def write_bodies(
 
 @contextmanager
 def warned(writer: RunFile) -> Iterator[None]:
-    """What ends a run is told among its warnings too."""
+    """What ends a run is told among its warnings too, if it is not the file itself."""
     try:
         yield
     except RunError as error:
-        writer.warn(str(error))
+        with suppress(RunError):
+            writer.warn(str(error))
         raise
 
 

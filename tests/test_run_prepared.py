@@ -15,7 +15,7 @@ from quasi_static_text import quick
 
 from dem_cli.engines.explicit.engine import ExplicitEngine
 from dem_cli.engines.pausing import thaw
-from dem_cli.errors import ResultsError
+from dem_cli.errors import ResultsError, RunError
 from dem_cli.results import open_results
 from dem_cli.run import Preparation, build_engine, prepare_scenario, run_scenario
 from dem_cli.scenario import parse_scenario
@@ -195,3 +195,19 @@ def test_states_hold_engines_and_nothing_else(
     with pytest.raises(ResultsError, match=why):
         run_scenario(scenario, tmp_path / "on.h5", prepared=Preparation(tmp_path / "first.h5", data))
     assert "hacked" not in capsys.readouterr().out
+
+
+def test_a_full_disk_is_what_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And not what goes wrong after it, when the run wants to leave a warning."""
+    calls = iter(range(1000))
+
+    def usage(_: object) -> Any:
+        return type("Usage", (), {"free": 0 if next(calls) > 3 else 10**12})
+
+    monkeypatch.setattr("dem_cli.results.run_file.shutil.disk_usage", usage)
+    with pytest.raises(
+        RunError, match=r"cannot write \(No space left on device\)\. What was written until then stays readable"
+    ):
+        run_scenario(parse_scenario(CASES["discs"]), tmp_path / "out.h5")
+    with open_results(tmp_path / "out.partial.h5") as results:
+        assert not results.complete

@@ -225,7 +225,7 @@ class Sweeping:
             raise ScenarioError(f"workers of another program version: {answer.reason}. Install the same one everywhere")
         if answer.end == "full":
             raise RunError(
-                f"{self.store.folder}: {answer.reason} Members that are done are kept; make room and run the same command again"
+                f"{self.store.folder}: {answer.reason.rstrip('.')}. Members that are done are kept; make room and run the same command again"
             )
         if job.member:
             self._end_member(job.member, answer)
