@@ -255,6 +255,24 @@ def test_what_another_sweep_has_finished_meanwhile_is_not_run(tmp_path: Path) ->
     one.store.close()
 
 
+def test_what_another_sweep_has_found_to_fail_is_not_tried_again(tmp_path: Path) -> None:
+    """Though ours began before that one wrote it into the manifest; with --retry it is."""
+    one = sweeping(tmp_path, workers := Obedient(slots=1))
+    other = sweeping(tmp_path, Obedient(lambda task: "failed" if "400gal-20Hz" in task.target else "stopped"))
+    other.store.preparation(next(iter(one.plan.shared)))[0].write_bytes(b"")
+    other.store.preparation(next(iter(one.plan.shared)))[1].write_bytes(b"")
+    other.run()
+    other.store.close()
+    tally = one.run()
+    assert tally.failed == {"400gal-20Hz": "it failed"}
+    assert "400gal-20Hz" not in names(workers)
+    one.store.close()
+    again = sweeping(tmp_path, workers := Obedient(), retry=True)
+    assert again.run().failed == {}
+    assert names(workers) == ["400gal-20Hz"]
+    again.store.close()
+
+
 def test_a_preparation_of_another_sweep_is_waited_for(tmp_path: Path) -> None:
     one = sweeping(tmp_path, workers := Obedient())
     other = Store(one.store.manifest)

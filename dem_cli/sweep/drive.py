@@ -194,8 +194,15 @@ class Sweeping:
                 yield job
 
     def _done_meanwhile(self, job: Job) -> bool:
-        """Whether another sweep has done it before we came to claim it."""
+        """Whether another sweep has done it, or found it to fail, before we came to claim it."""
         there = self._arrived(job)
+        reason = self.store.condemned(job.key)
+        if job.member and reason and not there and not self._retry:
+            del self._jobs[job.key]
+            self.tally.failed[job.name] = reason
+            self.store.condemn(job.key, reason)
+            self.store.release(job.key)
+            return True
         if there:
             del self._jobs[job.key]
             self.store.release(job.key)
@@ -218,6 +225,8 @@ class Sweeping:
             self.store.release(job.key)
             self._jobs = {job.key: job, **self._jobs}
             return
+        if answer.end in ("failed", "refused"):
+            self.store.condemn(job.key, answer.reason)
         self.store.release(job.key)
         if answer.end == "stopped":
             return

@@ -27,6 +27,7 @@ from dem_cli.results.manifest import NAME, Manifest, Member, read_manifest, writ
 from dem_cli.results.provenance import program_identity
 
 INNER = ".sweep"
+FAILED = "failed: "  # begins what a claim says of a member that fails
 
 
 class Store:
@@ -36,6 +37,7 @@ class Store:
         self.folder = manifest.folder
         self.manifest = manifest
         self._claims: dict[str, int] = {}
+        self._verdicts: dict[str, str] = {}  # what was written in a claim before it was ours
         inner = self.folder / INNER
         known = (self.folder / NAME).exists() or inner.exists()
         if self.folder.is_dir() and not known and any(self.folder.iterdir()):
@@ -109,10 +111,23 @@ class Store:
                 os.close(handle)
                 return False
             # a disk that knows no locks: then there is no protection, but the sweep can go on
+        self._verdicts[key] = os.pread(handle, 100_000, 0).decode(errors="replace")
         os.truncate(handle, 0)
-        os.write(handle, _ourselves().encode())
+        os.pwrite(handle, _ourselves().encode(), 0)
         self._claims[key] = handle
         return True
+
+    def condemn(self, key: str, reason: str) -> None:
+        """Leave word with the claim that a member fails, for sweeps that come to it before they read the manifest again."""
+        if (handle := self._claims.get(key)) is not None:
+            os.truncate(handle, 0)
+            os.pwrite(handle, f"{FAILED}{program_identity()}\n{reason}".encode(), 0)
+
+    def condemned(self, key: str) -> str:
+        """Why another sweep with this very program has found a member to fail, since we claimed it; else nothing."""
+        head = f"{FAILED}{program_identity()}\n"
+        said = self._verdicts.get(key, "")
+        return said.removeprefix(head) if said.startswith(head) else ""
 
     def owner(self, key: str) -> str:
         """Who has claimed it last."""
