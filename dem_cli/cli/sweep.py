@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -65,8 +66,6 @@ def command(
 
     Exit codes: 0 all members are done, 1 some failed (a table says why), 2 a mistake of yours, 130 interrupted.
     """
-    import os
-
     from dem_cli.errors import ScenarioError
     from dem_cli.sweep.plan import make_plan
 
@@ -75,7 +74,7 @@ def command(
     plan = make_plan(scenario, overrides, _varied(vary), None if yes else MANY)
     folder = output or Path(f"{scenario.stem}-sweep")
     if dry_run:
-        _list(plan, folder, jobs or os.cpu_count() or 1)
+        _list(plan, folder, jobs or _cores())
         return
 
     from dem_cli.sweep.store import Store
@@ -83,10 +82,17 @@ def command(
     store = Store(plan.manifest(folder))
     try:
         store.begin()
-        tally = _run(settings, plan, store, jobs or os.cpu_count() or 1, scheduler, retry)
+        tally = _run(settings, plan, store, jobs or _cores(), scheduler, retry)
     finally:
         store.close()
     _conclude(settings, tally, store, folder)
+
+
+def _cores() -> int:
+    """Those that this process may use: a batch system often gives fewer than the machine has."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _varied(texts: Sequence[str]) -> Points:
