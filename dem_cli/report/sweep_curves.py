@@ -1,0 +1,72 @@
+"""What the pictures of a sweep share: which axes they go over, cases by curve, and points with bars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from dem_cli.analysis.statistics import LEVEL, Estimate
+from dem_cli.report.look import COLORS
+from dem_cli.report.sweep import Sweep, SweepCase
+from dem_cli.report.sweep_axes import Axis
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+LINES = ("-", "--", ":", "-.")
+BARS = f"bars: {100.0 * LEVEL:.0f} % confidence of the mean over seeds (Student's t)"
+
+
+def varying(found: Sweep) -> list[Axis]:
+    return [axis for axis in found.axes if axis.varies]
+
+
+def plane(found: Sweep) -> list[Axis]:
+    """The two numeric axes that a map goes over, x first: frequency and amplitude where both vary, else the first two; or one, or none."""
+    numeric = [axis for axis in varying(found) if axis.values is not None]
+    shaking = [axis for name in ("frequency", "amplitude") for axis in numeric if axis.name == name]
+    return shaking if len(shaking) == 2 else numeric[:2]
+
+
+def words(found: Sweep, case: SweepCase, without: Sequence[Axis]) -> str:
+    """The case's points on all axes that vary but for those in `without`; "" if there are none."""
+    return ", ".join(
+        axis.words(place)
+        for axis, place in zip(found.axes, case.places, strict=True)
+        if axis.varies and axis not in without
+    )
+
+
+def by_words(found: Sweep, without: Sequence[Axis]) -> dict[str, list[SweepCase]]:
+    """Cases in groups that differ on the axes `without` only, in the order of the sweep."""
+    groups: dict[str, list[SweepCase]] = {}
+    for case in found.cases:
+        groups.setdefault(words(found, case, without), []).append(case)
+    return groups
+
+
+def bars(ax: Axes, x: float, value: Estimate, factor: float, color: str) -> None:
+    """Half width of the confidence interval of a mean, where there is one."""
+    if math.isfinite(value.half):
+        ax.errorbar(x, factor * value.mean, factor * value.half, color=color, lw=1.0, capsize=2.5, zorder=2)
+
+
+def looks(k: int) -> tuple[str, str, str]:
+    """Colour, marker and line of curve k: told apart without colour too."""
+    return COLORS[k % len(COLORS)], MARKERS[k % len(MARKERS)], LINES[(k // len(COLORS)) % len(LINES)]
+
+
+def legend_below(figure: Figure, ax: Axes, least: int = 2) -> None:
+    """The labels of `ax` below all panels, if there are `least` of them; a $ in a name is no formula."""
+    handles, labels = ax.get_legend_handles_labels()
+    if len(labels) >= least:
+        most = max(1, int(figure.get_figwidth() / (0.5 + 0.085 * max(map(len, labels)))))
+        figure.legend(
+            handles,
+            [label.replace("$", r"\$") for label in labels],
+            loc="outside lower center",
+            ncols=min(len(labels), most),
+        )
