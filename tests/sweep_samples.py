@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-import shutil
+import tempfile
 from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,14 @@ def grid(axes: Axes) -> list[dict[str, Any]]:
     return [dict(zip(axes, point, strict=True)) for point in product(*axes.values())]
 
 
+@cache
+def base() -> bytes:
+    """A result file that those of members are made from."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = made.make_file(Path(folder) / "base.h5", columns=12, rows=4, interval=0.02, tracks=None, frames=2)
+        return path.read_bytes()
+
+
 def make_sweep(
     folder: Path,
     axes: Axes = GRID,
@@ -65,10 +74,13 @@ def make_sweep(
     waiting: Iterable[str] = (),
     change: Callable[[Mapping[str, Any]], float] = change,
     former: tuple[str, ...] = (),
+    write: Callable[[Path, Mapping[str, Any]], object] | None = None,
 ) -> Path:
-    """A sweep over all combinations of `axes`; members named in `failed` or `waiting` have no file."""
+    """A sweep over all combinations of `axes`; members named in `failed` or `waiting` have no file.
+
+    change: of the void ratio. write: writes a member's file, in place of a shaken one.
+    """
     folder.mkdir()
-    base = made.make_file(folder / "base", columns=12, rows=4, interval=0.02, tracks=None, frames=2)
     members = []
     for k, settings in enumerate(grid(axes)):
         name = name_of(settings) or "only"
@@ -77,11 +89,14 @@ def make_sweep(
             reason = "grain 17 left the container at 1.2 s; take a smaller dt"
             member = member.with_state("failed", reason=reason, seconds=3.0)
         elif name not in waiting:
-            shutil.copy(base, folder / member.file)
-            edit(folder / member.file, member.hash, settings, change(settings))
+            if write is None:
+                (folder / member.file).write_bytes(base())
+                edit(folder / member.file, member.hash, settings, change(settings))
+            else:
+                write(folder / member.file, settings)
+                sign(folder / member.file, member.hash, settings)
             member = member.with_state("done", seconds=30.0 + k)
         members.append(member)
-    base.unlink()
     write_manifest(
         Manifest(
             title="Discs and ellipses over amplitude and frequency",
@@ -98,14 +113,20 @@ def make_sweep(
     return folder
 
 
-def edit(path: Path, scenario_hash: str, settings: Mapping[str, Any], change: float) -> None:
-    """Make a copied file that of a member."""
-    hertz, gal = number(settings.get(HERTZ, "2 Hz")), number(settings.get(GAL, "400 gal"))
-    before = packed(settings)
+def sign(path: Path, scenario_hash: str, settings: Mapping[str, Any]) -> None:
+    """Make a file that of a member, by its attributes."""
     with h5py.File(path, "a") as file:
         file.attrs["scenario_hash"] = scenario_hash
         file.attrs["seed"] = settings.get(SEED, 1)
         file.attrs["wall_time"] = 30.0
+
+
+def edit(path: Path, scenario_hash: str, settings: Mapping[str, Any], change: float) -> None:
+    """Make a copied file that of a member, and its numbers."""
+    sign(path, scenario_hash, settings)
+    hertz, gal = number(settings.get(HERTZ, "2 Hz")), number(settings.get(GAL, "400 gal"))
+    before = packed(settings)
+    with h5py.File(path, "a") as file:
         resolved = str(file.attrs["resolved"])
         for old, new in (
             ('amplitude = "4.0 m/s^2"', f'amplitude = "{gal / 100.0} m/s^2"'),

@@ -91,6 +91,8 @@ def _axis(keys: tuple[str, ...], points: tuple[tuple[Any, ...], ...], names: Seq
     texts = tuple(f"{value:.6g}" for value in values) if values is not None else tuple(_text(value) for value in column)
     if keys == (SCENARIO,):
         texts = tuple(PurePath(str(value)).stem for value in column)
+    if len(set(texts)) < len(texts):
+        texts = tuple(str(value) for value in values or column)
     return Axis(keys, points, shown[0], unit, texts, values)
 
 

@@ -105,10 +105,8 @@ def _matrices(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
         ax.set_ylabel(up.label)
         ax.spines[:].set_visible(False)
         ax.tick_params(length=0)
-        _write_cells(ax, image, cells, tables[label].shape, found.main, measure)
-        for place, case in cells.items():
-            if best is not None and case is found.cases[best.case]:
-                _frame(ax, place)
+        top = next((place for place, case in cells.items() if best and case is found.cases[best.case]), None)
+        _write_cells(ax, image, cells, tables[label].shape, found.main, measure, top)
     if image is not None:
         figure.colorbar(image, ax=grid, aspect=30, pad=0.02).set_label(measure.label, parse_math=False)
     return figure
@@ -131,20 +129,30 @@ def _means(cells: Cells, shape: tuple[int, int], name: str) -> Floats:
     return table
 
 
-def _write_cells(ax: Axes, image: AxesImage, cells: Cells, shape: tuple[int, int], name: str, measure: Measure) -> None:
+def _write_cells(
+    ax: Axes,
+    image: AxesImage,
+    cells: Cells,
+    shape: tuple[int, int],
+    name: str,
+    measure: Measure,
+    best: tuple[int, int] | None,
+) -> None:
+    """Numbers on the cells that have one, hatches on the others, a frame round the best."""
     for row, column in np.ndindex(*shape):
         case = cells.get((row, column))
         value = case.estimate(name) if case else None
-        if value is None or not value.n:
-            _hatch(ax, row, column)
-        color = "black"
+        text, color, pad = cell_text(case, value, measure), "black", None
         if value is not None and value.n:
             red, green, blue, _ = image.to_rgba(np.array([measure.factor * value.mean]))[0]
             color = "white" if 0.2126 * red + 0.7152 * green + 0.0722 * blue < DARK else "black"
-        pad = {"facecolor": "white", "edgecolor": "none", "pad": 1.0} if value is None or not value.n else None
-        ax.text(
-            column, row, cell_text(case, value, measure), ha="center", va="center", fontsize=7.5, color=color, bbox=pad
-        )
+        else:
+            _hatch(ax, row, column)
+            pad = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        if best == (row, column):
+            _frame(ax, best)
+            text += "\nbest"
+        ax.text(column, row, text, ha="center", va="center", fontsize=7.5, color=color, bbox=pad)
 
 
 def cell_text(case: SweepCase | None, value: Estimate | None, measure: Measure) -> str:

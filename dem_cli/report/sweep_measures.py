@@ -102,7 +102,7 @@ TABLES: dict[Kind, tuple[tuple[str, tuple[str, ...]], ...]] = {
             ),
         ),
         (
-            "Settlement, and the surface while shaken",
+            "Settlement; mode cos(pi x/l) of the surface in the last shaking, T1 of a liquid as deep",
             (
                 "depth_packed", "settlement", "period_ratio", "driven_amplitude", "driven_ratio", "period", "amplitude", "escaped",
                 "wall_time",

@@ -51,7 +51,8 @@ def _head(found: Sweep) -> Block:
     rows += [(f"varies {axis.label}", " | ".join(axis.texts)) for axis in found.axes]
     if found.repeated:
         rows.append(("seeds", ", ".join(map(str, seeds))))
-    rows.append((f"{len(found.entries)} members", counts + begun_text))
+    members = "1 member" if len(found.entries) == 1 else f"{len(found.entries)} members"
+    rows.append((members, counts + begun_text))
     if found.seconds > 0.0:
         rows.append(("computing", duration(found.seconds)))
     return Block(found.title or found.folder.name, (), tuple(rows), left=2)
@@ -146,7 +147,7 @@ def _waiting(found: Sweep) -> Block:
     points = sum("done" not in case.counts for case in found.cases)
     text = f"{count} of {len(found.entries)} members have not been run; dem sweep --resume goes on"
     if points and found.repeated:
-        text += f". Of {points} of {len(found.cases)} points there is no run yet"
+        text += f". Points without any result: {points} of {len(found.cases)}"
     return Block("Waiting", (), ((text,),) if count else ())
 
 
