@@ -152,7 +152,7 @@ def test_one_numeric_axis_is_a_curve_with_bars(tmp_path: Path) -> None:
     grid = {made.GAL: ("800 gal", "400 gal"), made.SHAPE: ("disc", "ellipse"), made.SEED: (1, 2, 3)}
     figure = draw(read_sweep(made.make_sweep(tmp_path / "line", grid)), "map")[2]
     ax = figure.axes[0]
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("amplitude [gal]", "change of the void ratio")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("amplitude [gal]", "change of the void ratio (- denser)")
     found = curves(ax)
     assert found.keys() == {"disc", "ellipse"}
     assert [x for x, _ in found["disc"]] == [400.0, 800.0]
@@ -210,7 +210,7 @@ def test_resonance_is_over_t1_a_curve_for_each_amplitude_and_shape(found: Sweep)
 
 
 def test_resonance_says_what_it_leaves_out(tmp_path: Path) -> None:
-    folder = made.make_sweep(tmp_path / "slow", {made.HERTZ: ("1 Hz", "2 Hz"), made.SEED: (1, 2)})
+    folder = made.make_sweep(tmp_path / "slow", {made.HERTZ: ("1 Hz", "2 Hz", "5 Hz"), made.SEED: (1, 2)})
     import h5py
 
     for name in ("1-1.h5", "1-2.h5"):
@@ -218,7 +218,7 @@ def test_resonance_says_what_it_leaves_out(tmp_path: Path) -> None:
             file.attrs["resolved"] = file.attrs["resolved"].replace("1.0 Hz", "0.5 Hz")
     _, caption, figure = draw(read_sweep(folder), "resonance")
     assert "Left out: 2 runs (shaken for less than 3 driving periods of 2 s)." in caption
-    assert len(curves(figure.axes[0])["all runs"]) == 1
+    assert len(curves(figure.axes[0])["all runs"]) == 2
 
 
 def test_resonance_bars_are_those_of_seeds(tmp_path: Path) -> None:
@@ -280,7 +280,9 @@ def test_sections_are_those_that_the_sweep_has(found: Sweep, tmp_path: Path) -> 
     ]
     assert all(caption.endswith(".") for _, caption, _ in sections(found))
     plain = read_sweep(made.make_sweep(tmp_path / "plain", {made.SEED: (1, 2)}))
-    assert [title for title, _, _ in sections(plain)] == ["Resonance of the surface"]
+    assert sections(plain) == []
+    with pytest.raises(ScenarioError, match="vary the frequency"):
+        draw(plain, "resonance")
 
 
 @pytest.mark.parametrize("state", ["failed", "waiting"])

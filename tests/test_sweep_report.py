@@ -300,6 +300,16 @@ def test_best_of_single_runs_has_no_confidence(tmp_path: Path) -> None:
     ]
 
 
+def test_best_is_no_single_run_while_others_have_several(tmp_path: Path) -> None:
+    grid = {made.GAL: ("400 gal", "800 gal", "1200 gal"), made.SEED: (1, 2)}
+    folder = made.make_sweep(tmp_path / "half", grid, waiting=["1200-2"])
+    best = best_point(read_sweep(folder))
+    assert best is not None
+    assert (best.label, best.single) == ("800 gal", ("1200 gal",))
+    assert "better still, but in one run only: 1200 gal" in lines(best)
+    assert not [line for line in lines(best) if "too few" in line]
+
+
 def test_best_that_stands_out(tmp_path: Path) -> None:
     grid = {made.GAL: ("400 gal", "800 gal"), made.SEED: (1, 2, 3)}
     best = best_point(read_sweep(made.make_sweep(tmp_path / "two", grid)))

@@ -34,20 +34,27 @@ class Rival:
 
 @dataclass(frozen=True)
 class Best:
-    """The case with the best mean of `measure`, and all other cases that have it, the nearest first. case: its number in the sweep."""
+    """The case with the best mean of `measure`, and all other cases that have it, the nearest first. case: its number in the sweep.
+
+    single: cases of one run whose value is better still, while this one has several.
+    """
 
     measure: str
     case: int
     label: str
     estimate: Estimate
     rivals: tuple[Rival, ...]
+    single: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
         return dataclasses.asdict(self)
 
 
 def best_point(found: Sweep, measure: str | None = None) -> Best | None:
-    """By `measure`, or the sweep's main one. None where no case has it, or only one is in the sweep."""
+    """By `measure`, or the sweep's main one. None where no case has it, or only one is in the sweep.
+
+    A case of one run is not taken while others have several: it would be the best by luck too often.
+    """
     name = measure or found.main
     known = [(k, case, case.estimate(name)) for k, case in enumerate(found.cases) if case.kind in found.kinds[:1]]
     known = [one for one in known if one[2].n]
@@ -55,11 +62,14 @@ def best_point(found: Sweep, measure: str | None = None) -> Best | None:
         return None
     sign = -1.0 if MEASURES[name].best[0] == "largest" else 1.0
     known.sort(key=lambda one: sign * one[2].mean)
-    (k, case, top), others = known[0], known[1:]
+    chosen = next((one for one in known if one[2].n > 1), known[0])
+    k, case, top = chosen
+    others = [one for one in known if one is not chosen]
     apart = [difference(case.by_seed(name), other.by_seed(name)) for _, other, _ in others]
     corrected = holm([one.p for one in apart])
     rivals = tuple(Rival(other.label, one, p) for (_, other, _), one, p in zip(others, apart, corrected, strict=True))
-    return Best(name, k, case.label, top, rivals)
+    single = tuple(other.label for _, other, _ in known[: known.index(chosen)])
+    return Best(name, k, case.label, top, rivals, single)
 
 
 def lines(best: Best) -> list[str]:
@@ -73,14 +83,18 @@ def lines(best: Best) -> list[str]:
         value += " (one run, so there is no confidence)"
     found = [f"best ({measure.best[1]}): {best.label}: {measure.label} {value}"]
     alike = [rival.label for rival in best.rivals if rival.told_apart is False]
-    unknown = [rival.label for rival in best.rivals if rival.told_apart is None]
+    unknown = [rival.label for rival in best.rivals if rival.told_apart is None and rival.label not in best.single]
     tested = [rival for rival in best.rivals if rival.told_apart is not None]
     if alike:
         found.append(f"not distinguishable from {_some(alike, '; ')}")
     elif tested:
         found.append(
-            f"distinguishable from all other {len(tested)}" if tested[1:] else f"distinguishable from {tested[0].label}"
+            f"distinguishable from all {len(tested)} others"
+            if tested[1:]
+            else f"distinguishable from {tested[0].label}"
         )
+    if best.single:
+        found.append(f"better still, but in one run only: {_some(list(best.single), '; ')}")
     if unknown:
         each = "the others" if len(unknown) == len(best.rivals) else _some(unknown, "; ")
         found.append(f"too few seeds to tell it from {each}")

@@ -14,6 +14,7 @@ from dem_cli.report.sweep_axes import Axis
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Transform
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LINES = ("-", "--", ":", "-.")
@@ -48,10 +49,23 @@ def by_words(found: Sweep, without: Sequence[Axis]) -> dict[str, list[SweepCase]
     return groups
 
 
-def bars(ax: Axes, x: float, value: Estimate, factor: float, color: str) -> None:
-    """Half width of the confidence interval of a mean, where there is one."""
+def bars(ax: Axes, x: float, value: Estimate, factor: float, color: str, where: Transform | None = None) -> None:
+    """Half width of the confidence interval of a mean, where there is one. where: in place of the data's own coordinates."""
     if math.isfinite(value.half):
-        ax.errorbar(x, factor * value.mean, factor * value.half, color=color, lw=1.0, capsize=2.5, zorder=2)
+        mean, half = factor * value.mean, factor * value.half
+        ax.errorbar(x, mean, half, color=color, lw=1.0, capsize=2.5, zorder=2, transform=where or ax.transData)
+
+
+def beside(ax: Axes, points: float) -> Transform:
+    """The data's coordinates, shifted to the right on the paper, so that bars at one place do not hide each other."""
+    from matplotlib.transforms import offset_copy
+
+    return offset_copy(ax.transData, ax.get_figure(root=True), x=points, units="points")
+
+
+def dodged(ax: Axes, k: int, count: int) -> Transform:
+    """Coordinates of curve k of `count`."""
+    return beside(ax, 3.0 * (k - 0.5 * (count - 1)))
 
 
 def looks(k: int) -> tuple[str, str, str]:

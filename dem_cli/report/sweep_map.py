@@ -14,7 +14,7 @@ from dem_cli.report.look import DIVERGING, SEQUENTIAL, new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
 from dem_cli.report.sweep_best import best_point, lines
-from dem_cli.report.sweep_curves import BARS, bars, by_words, legend_below, looks, plane, varying
+from dem_cli.report.sweep_curves import BARS, bars, beside, by_words, dodged, legend_below, looks, plane, varying
 from dem_cli.report.sweep_measures import MEASURES, Measure
 from dem_cli.report.text import number
 from dem_cli.state import Floats
@@ -37,20 +37,24 @@ def draw_map(found: Sweep) -> tuple[str, str, Figure]:
         raise ScenarioError("--what map: nothing but seeds varies in this sweep")
     axes, measure = plane(found), MEASURES[found.main]
     over = " and ".join(axis.name for axis in axes) or " and ".join(axis.name for axis in varying(found))
-    title = f"{_capital(measure.label)} over {over}"
+    title = f"{_capital(measure.label.partition(' [')[0])} over {over}"
     best = best_point(found)
     said = _capital("; ".join(lines(best))) + "." if best else ""
     if len(axes) == 2:
         figure = _matrices(found, axes, measure)
         caption = (
             f"In each cell the mean, and half of its {100.0 * LEVEL:.0f} % confidence interval where it has several seeds "
-            f"(their number in brackets). One scale of colours for all panels. Framed: the best point. Hatched: nothing is known. {said}"
+            f"(their number in brackets); one scale of colours for all panels. Hatched: nothing is known."
         )
+        mark = "Framed"
     else:
         figure = _curves(found, axes, measure)
-        caption = f"Mean over seeds; {BARS}, small dots: each run. Ring: the best point. {said}"
+        caption = f"Mean over seeds; {BARS}, small dots: each run."
+        mark = "Ringed"
+    if best:
+        caption += f" {mark}: the best point. {said}"
     figure.suptitle(title, parse_math=False)
-    return title, caption.strip(), figure
+    return title, caption, figure
 
 
 def _capital(text: str) -> str:
@@ -108,8 +112,13 @@ def _matrices(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
         top = next((place for place, case in cells.items() if best and case is found.cases[best.case]), None)
         _write_cells(ax, image, cells, tables[label].shape, found.main, measure, top)
     if image is not None:
-        figure.colorbar(image, ax=grid, aspect=30, pad=0.02).set_label(measure.label, parse_math=False)
+        figure.colorbar(image, ax=grid, aspect=30, pad=0.02).set_label(_sense(found.main), parse_math=False)
     return figure
+
+
+def _sense(name: str) -> str:
+    """Label of a measure's axis; of a change which sign is which."""
+    return f"{MEASURES[name].label} (- denser)" if name.endswith("_change") else MEASURES[name].label
 
 
 def _at(found: Sweep, axis: Axis) -> int:
@@ -206,27 +215,28 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
     shift = 0.0 if axis.values is not None else 0.5 / max(len(groups), 2)
     for k, (label, cases) in enumerate(groups.items()):
         color, marker, line = looks(k)
+        step = k - 0.5 * (len(groups) - 1)
+        where = ax.transData if axis.values is None else dodged(ax, k, len(groups))
         points = []
         for case in cases:
-            value = case.estimate(found.main)
+            value, place = case.estimate(found.main), case.places[at]
             if not value.n:
                 continue
-            place = case.places[at]
-            x = axis.values[place] if axis.values is not None else place + shift * (k - 0.5 * (len(groups) - 1))
+            x = place + shift * step if axis.values is None else axis.values[place]
             points.append((x, measure.factor * value.mean))
-            bars(ax, x, value, measure.factor, color)
+            bars(ax, x, value, measure.factor, color, where)
             if value.n > 1:
                 each = [measure.factor * one for one in case.by_seed(found.main).values() if math.isfinite(one)]
-                ax.scatter([x] * len(each), each, s=4.0, color=color, alpha=0.6, linewidths=0.0, zorder=2)
+                aside = beside(ax, 3.0 * step + 5.0 if axis.values is not None else 5.0)
+                ax.scatter([x] * len(each), each, s=5.0, color=color, alpha=0.6, lw=0.0, zorder=2, transform=aside)
             if best is not None and case is found.cases[best.case]:
                 ax.plot(
-                    *points[-1], ls="", marker="o", ms=13.0, mfc="none", mec="black",
-                    mew=1.6, zorder=4, gid="best",
+                    *points[-1], ls="", marker="o", ms=13.0, mfc="none", mec="black", mew=1.6, zorder=4, gid="best", transform=where,
                 )  # fmt: skip
         points.sort()
         ax.plot(
-            [x for x, _ in points], [y for _, y in points],
-            color=color, marker=marker, ms=5.0, ls=line if axis.values is not None else "", label=label or None, zorder=3,
+            [x for x, _ in points], [y for _, y in points], color=color, marker=marker, ms=5.0,
+            ls=line if axis.values is not None else "", label=label or None, zorder=3, transform=where,
         )  # fmt: skip
     if axis.values is not None:
         ax.set_xticks(axis.values, axis.texts)
@@ -234,6 +244,6 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
         ax.set_xticks(range(len(axis.points)), list(axis.texts), parse_math=False)
         ax.set_xlim(-0.6, len(axis.points) - 0.4)
     ax.set_xlabel(axis.label, parse_math=False)
-    ax.set_ylabel(measure.label, parse_math=False)
+    ax.set_ylabel(_sense(found.main), parse_math=False)
     legend_below(figure, ax)
     return figure

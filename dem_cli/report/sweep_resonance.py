@@ -9,12 +9,14 @@ from dem_cli.errors import ScenarioError
 from dem_cli.report.look import new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
-from dem_cli.report.sweep_curves import BARS, bars, by_words, legend_below, looks
+from dem_cli.report.sweep_curves import BARS, bars, by_words, dodged, legend_below, looks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.transforms import Transform
 
+APART = 1.05  # ratio of the longest period over T1 to the shortest below which there is no curve
 WIDE = 4.0  # ratio of the longest period to the shortest from which their axis is logarithmic
 CAPTION = (
     "Amplitude of the first antisymmetric mode of the free surface, cos(pi x/l), at the driving frequency: the sine that fits it best "
@@ -35,11 +37,14 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
         for label, cases in by_words(found, frequency).items()
     }
     groups = {label: cases for label, cases in groups.items() if cases}
+    ratios = [case.estimate("period_ratio").mean for cases in groups.values() for case in cases]
+    if max(ratios) < APART * min(ratios):
+        raise ScenarioError("--what resonance: all members are shaken at the same period over T1; vary the frequency")
     figure = new_figure(6.4, 6.2)
     top, bottom = figure.subplots(2, 1, sharex=True)
     for k, (label, cases) in enumerate(groups.items()):
-        _curve(top, cases, "driven_amplitude", 1e3, label, k)
-        _curve(bottom, cases, "driven_ratio", 1.0, label, k)
+        _curve(top, cases, "driven_amplitude", 1e3, label, k, dodged(top, k, len(groups)))
+        _curve(bottom, cases, "driven_ratio", 1.0, label, k, dodged(bottom, k, len(groups)))
     quiet = max(case.estimate("quiet").mean for cases in groups.values() for case in cases)
     top.axhline(1e3 * quiet, color="0.6", lw=0.8, ls=":", zorder=1)
     top.annotate(
@@ -58,24 +63,24 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
         "T = T1", (1.0, 1.0), xycoords=top.get_xaxis_transform(), xytext=(3.0, -2.0), textcoords="offset points",
         ha="left", va="top", fontsize=8, color="0.35",
     )  # fmt: skip
-    _periods(bottom, [case.estimate("period_ratio").mean for cases in groups.values() for case in cases])
+    _periods(bottom, ratios)
     legend_below(figure, top, 1)
     title = "Resonance of the surface"
     figure.suptitle(title)
     return title, f"{CAPTION} {BARS[0].upper()}{BARS[1:]}. {_left_out(found, frequency)}".strip(), figure
 
 
-def _curve(ax: Axes, cases: list[SweepCase], name: str, factor: float, label: str, k: int) -> None:
+def _curve(ax: Axes, cases: list[SweepCase], name: str, factor: float, label: str, k: int, where: Transform) -> None:
     color, marker, line = looks(k)
     points = []
     for case in cases:
         value, x = case.estimate(name), case.estimate("period_ratio").mean
         points.append((x, factor * value.mean))
-        bars(ax, x, value, factor, color)
+        bars(ax, x, value, factor, color, where)
     points.sort()
     ax.plot(
         [x for x, _ in points], [y for _, y in points],
-        color=color, marker=marker, ms=4.5, ls=line, label=label or "all runs", zorder=3,
+        color=color, marker=marker, ms=4.5, ls=line, label=label or "all runs", zorder=3, transform=where,
     )  # fmt: skip
 
 
