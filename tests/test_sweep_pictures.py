@@ -157,6 +157,10 @@ def test_one_numeric_axis_is_a_curve_with_bars(tmp_path: Path) -> None:
     assert found.keys() == {"disc", "ellipse"}
     assert [x for x, _ in found["disc"]] == [400.0, 800.0]
     assert bars(ax) == 4
+    assert ax.get_xlim() == pytest.approx((376.0, 824.0))
+    low, high = ax.get_ylim()
+    assert low < -0.0162 < -0.0077 < high
+    assert high - low < 0.012
     (mark,) = best_marks(figure)
     assert mark.get_xydata()[0].tolist() == pytest.approx(found["disc"][1])
 
@@ -207,6 +211,9 @@ def test_resonance_is_over_t1_a_curve_for_each_amplitude_and_shape(found: Sweep)
     assert "T = T1" in texts(top)
     assert "tanh(pi h/l)" in caption
     assert bottom.get_xscale() == "log"
+    assert top.get_ylim() == pytest.approx((0.0, 21.2))
+    low, high = bottom.get_xlim()
+    assert low < 0.2 / made.T1 < 1.0 / made.T1 < high < 3.0
 
 
 def test_resonance_says_what_it_leaves_out(tmp_path: Path) -> None:

@@ -56,16 +56,23 @@ def bars(ax: Axes, x: float, value: Estimate, factor: float, color: str, where: 
         ax.errorbar(x, mean, half, color=color, lw=1.0, capsize=2.5, zorder=2, transform=where or ax.transData)
 
 
+def ends(value: Estimate, factor: float) -> tuple[float, float]:
+    """Of the bar of a mean, or the mean twice."""
+    half = value.half if math.isfinite(value.half) else 0.0
+    return factor * (value.mean - half), factor * (value.mean + half)
+
+
+def fit(low: float, high: float, margin: float = 0.06) -> tuple[float, float]:
+    """Limits of an axis with room at both ends; set by hand, as matplotlib leaves out what is shifted on the paper."""
+    room = margin * (high - low) or 0.1 * abs(high) or 1.0
+    return low - room, high + room
+
+
 def beside(ax: Axes, points: float) -> Transform:
     """The data's coordinates, shifted to the right on the paper, so that bars at one place do not hide each other."""
     from matplotlib.transforms import offset_copy
 
     return offset_copy(ax.transData, ax.get_figure(root=True), x=points, units="points")
-
-
-def dodged(ax: Axes, k: int, count: int) -> Transform:
-    """Coordinates of curve k of `count`."""
-    return beside(ax, 3.0 * (k - 0.5 * (count - 1)))
 
 
 def looks(k: int) -> tuple[str, str, str]:

@@ -14,7 +14,18 @@ from dem_cli.report.look import DIVERGING, SEQUENTIAL, new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
 from dem_cli.report.sweep_best import best_point, lines
-from dem_cli.report.sweep_curves import BARS, bars, beside, by_words, dodged, legend_below, looks, plane, varying
+from dem_cli.report.sweep_curves import (
+    BARS,
+    bars,
+    beside,
+    by_words,
+    ends,
+    fit,
+    legend_below,
+    looks,
+    plane,
+    varying,
+)
 from dem_cli.report.sweep_measures import MEASURES, Measure
 from dem_cli.report.text import number
 from dem_cli.state import Floats
@@ -213,10 +224,12 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
     ax.grid(axis="y", color="0.9", lw=0.6)
     ax.set_axisbelow(True)
     shift = 0.0 if axis.values is not None else 0.5 / max(len(groups), 2)
+    reached: list[float] = []
     for k, (label, cases) in enumerate(groups.items()):
         color, marker, line = looks(k)
         step = k - 0.5 * (len(groups) - 1)
-        where = ax.transData if axis.values is None else dodged(ax, k, len(groups))
+        aside = 0.0 if axis.values is None else step * min(9.0, 36.0 / len(groups))
+        where = beside(ax, aside)
         points = []
         for case in cases:
             value, place = case.estimate(found.main), case.places[at]
@@ -225,10 +238,13 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
             x = place + shift * step if axis.values is None else axis.values[place]
             points.append((x, measure.factor * value.mean))
             bars(ax, x, value, measure.factor, color, where)
+            reached += ends(value, measure.factor)
             if value.n > 1:
                 each = [measure.factor * one for one in case.by_seed(found.main).values() if math.isfinite(one)]
-                aside = beside(ax, 3.0 * step + 5.0 if axis.values is not None else 5.0)
-                ax.scatter([x] * len(each), each, s=5.0, color=color, alpha=0.6, lw=0.0, zorder=2, transform=aside)
+                reached += each
+                ax.scatter(
+                    [x] * len(each), each, s=5.0, color=color, alpha=0.6, lw=0.0, zorder=2, transform=beside(ax, aside + 4.0),
+                )  # fmt: skip
             if best is not None and case is found.cases[best.case]:
                 ax.plot(
                     *points[-1], ls="", marker="o", ms=13.0, mfc="none", mec="black", mew=1.6, zorder=4, gid="best", transform=where,
@@ -240,9 +256,11 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
         )  # fmt: skip
     if axis.values is not None:
         ax.set_xticks(axis.values, axis.texts)
+        ax.set_xlim(*fit(min(axis.values), max(axis.values)))
     else:
         ax.set_xticks(range(len(axis.points)), list(axis.texts), parse_math=False)
         ax.set_xlim(-0.6, len(axis.points) - 0.4)
+    ax.set_ylim(*fit(min(reached), max(reached)))
     ax.set_xlabel(axis.label, parse_math=False)
     ax.set_ylabel(_sense(found.main), parse_math=False)
     legend_below(figure, ax)

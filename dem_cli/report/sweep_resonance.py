@@ -9,12 +9,11 @@ from dem_cli.errors import ScenarioError
 from dem_cli.report.look import new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
-from dem_cli.report.sweep_curves import BARS, bars, by_words, dodged, legend_below, looks
+from dem_cli.report.sweep_curves import BARS, bars, by_words, ends, fit, legend_below, looks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.transforms import Transform
 
 APART = 1.05  # ratio of the longest period over T1 to the shortest below which there is no curve
 WIDE = 4.0  # ratio of the longest period to the shortest from which their axis is logarithmic
@@ -42,9 +41,10 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
         raise ScenarioError("--what resonance: all members are shaken at the same period over T1; vary the frequency")
     figure = new_figure(6.4, 6.2)
     top, bottom = figure.subplots(2, 1, sharex=True)
+    panels = ((top, "driven_amplitude", 1e3), (bottom, "driven_ratio", 1.0))
     for k, (label, cases) in enumerate(groups.items()):
-        _curve(top, cases, "driven_amplitude", 1e3, label, k, dodged(top, k, len(groups)))
-        _curve(bottom, cases, "driven_ratio", 1.0, label, k, dodged(bottom, k, len(groups)))
+        for ax, name, factor in panels:
+            _curve(ax, cases, name, factor, label, k)
     quiet = max(case.estimate("quiet").mean for cases in groups.values() for case in cases)
     top.axhline(1e3 * quiet, color="0.6", lw=0.8, ls=":", zorder=1)
     top.annotate(
@@ -54,9 +54,10 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
     top.set_ylabel("amplitude of the surface [mm]")
     bottom.set_ylabel("over that of the ground")
     bottom.set_xlabel("driving period over T1 of a liquid as deep")
-    for ax in (top, bottom):
+    for ax, name, factor in panels:
         ax.axvline(1.0, color="0.35", lw=1.0, ls="--", zorder=1)
-        ax.set_ylim(bottom=0.0)
+        highest = max(ends(case.estimate(name), factor)[1] for cases in groups.values() for case in cases)
+        ax.set_ylim(0.0, fit(0.0, highest)[1])
         ax.grid(axis="y", color="0.92", lw=0.6)
         ax.set_axisbelow(True)
     top.annotate(
@@ -70,17 +71,17 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
     return title, f"{CAPTION} {BARS[0].upper()}{BARS[1:]}. {_left_out(found, frequency)}".strip(), figure
 
 
-def _curve(ax: Axes, cases: list[SweepCase], name: str, factor: float, label: str, k: int, where: Transform) -> None:
+def _curve(ax: Axes, cases: list[SweepCase], name: str, factor: float, label: str, k: int) -> None:
     color, marker, line = looks(k)
     points = []
     for case in cases:
         value, x = case.estimate(name), case.estimate("period_ratio").mean
         points.append((x, factor * value.mean))
-        bars(ax, x, value, factor, color, where)
+        bars(ax, x, value, factor, color)
     points.sort()
     ax.plot(
         [x for x, _ in points], [y for _, y in points],
-        color=color, marker=marker, ms=4.5, ls=line, label=label or "all runs", zorder=3, transform=where,
+        color=color, marker=marker, ms=4.5, ls=line, label=label or "all runs", zorder=3,
     )  # fmt: skip
 
 
@@ -89,6 +90,7 @@ def _periods(ax: Axes, ratios: list[float]) -> None:
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     low, high = min(ratios), max(ratios)
+    ax.set_xlim(*fit(min(low, 1.0), max(high, 1.0)))
     if high < WIDE * low:
         return
     ax.set_xscale("log")
