@@ -91,6 +91,7 @@ def test_map_holds_each_mean_where_it_belongs(found: Sweep) -> None:
     np.testing.assert_allclose(np.ma.filled(disc.images[0].get_array(), np.nan), want, rtol=1e-9)
     assert disc.images[0].get_clim() == ellipse.images[0].get_clim()
     assert disc.images[0].get_cmap().name == SEQUENTIAL
+    assert disc.get_ylim() == (-0.5, 1.5)  # the larger amplitude on top
     assert texts(disc)[0] == "failed"
     assert texts(disc)[4] == "-0.0161\n± 0.0002 (3)\nbest"
     assert texts(ellipse)[5] == "waiting"

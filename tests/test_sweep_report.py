@@ -222,6 +222,20 @@ def test_surface_is_measured_over_that_of_the_ground_and_t1(found: Sweep) -> Non
     )
 
 
+def test_t1_is_of_the_depth_before_the_shaking(tmp_path: Path) -> None:
+    """Linear theory, not the thesis' formula, which differs in a shallow fill."""
+    folder = made.make_sweep(tmp_path / "shallow", {})
+    with h5py.File(folder / "only.h5", "a") as file:
+        names = list(file["stages/quantity"].asstr()[:])
+        file["stages/before"][1, names.index("depth")] = 0.03
+    numbers = read_sweep(folder).entries[0].numbers
+    assert numbers is not None
+    wave = math.pi / 0.175
+    t1 = 2.0 * math.pi / math.sqrt(9.80665 * wave * math.tanh(wave * 0.03))
+    assert numbers.values["period_ratio"] == pytest.approx(0.5 / t1, rel=1e-9)
+    assert numbers.values["theory_T1"] == pytest.approx(t1, rel=1e-9)
+
+
 def _ends(case: SweepCase) -> list[tuple[float, float]]:
     settings = [{**case.settings, made.SEED: seed} for seed in (1, 2, 3)]
     return [(made.packed(one), made.change(one)) for one in settings]
