@@ -115,6 +115,20 @@ def test_map_of_both_signs_is_centred_on_zero(tmp_path: Path) -> None:
     assert texts(figure.axes[0])[:2] == ["-0.0010\nbest", "-0.0010"]
 
 
+def test_map_of_another_measure(folder: Path, found: Sweep, tmp_path: Path) -> None:
+    title, caption, figure = draw(found.by("driven_amplitude"), "map")
+    assert title == "Amplitude of the surface at the driving frequency over frequency and amplitude"
+    np.testing.assert_allclose(
+        np.ma.filled(figure.axes[0].images[0].get_array(), 0.0), [[0, 10, 5], [5, 20, 10]], rtol=1e-6
+    )
+    assert "Best (largest): disc, 800 gal, 2 Hz" in caption
+    with pytest.raises(ScenarioError, match='Did you mean "settlement"'):
+        found.by("setlement")
+    assert call(folder, "--color", "settlement", "-o", tmp_path / "settlement.png").exit_code == 0
+    wrong = call(folder, "--color", "settlement", "--what", "shapes")
+    assert "--color has no meaning for --what shapes of a sweep" in str(wrong.exception)
+
+
 def test_text_in_cells_can_be_read_on_dark_and_light(found: Sweep) -> None:
     ax = draw(found, "map")[2].axes[0]
     colors = {text.get_text().split("\n")[0]: text.get_color() for text in ax.texts}

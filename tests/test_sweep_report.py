@@ -154,19 +154,34 @@ def test_axes_of_words() -> None:
     assert axes(same)[0][1] == ("a/discs.toml", "b/discs.toml")
 
 
-def test_keys_that_go_together_are_one_axis_but_for_amplitude_and_frequency() -> None:
+def test_keys_that_go_together_are_one_axis() -> None:
+    """It has the numbers of a key that tells its points apart, of frequency or amplitude before others; else it is of words."""
     zipped = SweepAxis(("grains.count", "container.width", "seed"), ((500, "50 cm", 1), (1000, "1 m", 2)), "zip")
-    assert axes(zipped) == [
-        (
-            "grains.count & container.width",
-            ("grains.count 500, container.width 50 cm", "grains.count 1000, container.width 1 m"),
-            None,
-        )
-    ]
-    shaken = SweepAxis(
-        ("stage.shake.amplitude", "stage.shake.frequency"), (("400 gal", "10 Hz"), ("400 gal", "2 Hz")), "zip"
+    assert axes(zipped) == [("grains.count", ("500", "1000"), (500.0, 1000.0))]
+    (axis,) = axes_of(Manifest("t", "s", (zipped,), ()))
+    assert axis.with_others == ("grains.count 500, container.width 50 cm", "grains.count 1000, container.width 1 m")
+    slow = SweepAxis(("stage.2.duration", "stage.2.frequency"), (("5 s", "10 Hz"), ("50 s", "1 Hz")), "zip")
+    assert axes(slow) == [("frequency [Hz]", ("10", "1"), (10.0, 1.0))]
+    same = SweepAxis(("grains.count", "grains.shape"), ((500, "disc"), (500, "ellipse")), "zip")
+    assert axes(same)[0] == (
+        "grains.count & grains.shape",
+        ("grains.count 500, grains.shape disc", "grains.count 500, grains.shape ellipse"),
+        None,
     )
-    assert axes(shaken) == [("amplitude [gal]", ("400",), (400.0,)), ("frequency [Hz]", ("10", "2"), (10.0, 2.0))]
+
+
+def test_amplitude_and_frequency_are_always_two_axes() -> None:
+    two = [("amplitude [gal]", ("400",), (400.0,)), ("frequency [Hz]", ("10", "2"), (10.0, 2.0))]
+    keys = ("stage.shake.amplitude", "stage.shake.frequency")
+    assert axes(SweepAxis(keys, (("400 gal", "10 Hz"), ("400 gal", "2 Hz")), "zip")) == two
+    longer = (("400 gal", "10 Hz", "1 s"), ("400 gal", "2 Hz", "5 s"))
+    assert axes(SweepAxis((*keys, "stage.shake.duration"), longer, "zip")) == two
+    again = (*longer, ("400 gal", "2 Hz", "9 s"))
+    assert axes(SweepAxis((*keys, "stage.shake.duration"), again, "zip"))[2] == (
+        "duration [s]",
+        ("1", "5", "9"),
+        (1.0, 5.0, 9.0),
+    )
 
 
 def test_keys_of_two_stages_are_told_apart() -> None:
@@ -379,6 +394,14 @@ def test_one_member(tmp_path: Path) -> None:
     assert "all runs" in text
     assert best_point(found) is None
     assert "+-" not in text
+
+
+def test_sweep_without_members(tmp_path: Path) -> None:
+    write_manifest(
+        Manifest("none", "s.toml", (SweepAxis(("seed",), ()), SweepAxis((made.GAL,), ())), (), folder=tmp_path)
+    )
+    assert text_of(read_sweep(tmp_path)).splitlines()[-1].split() == ["0", "members", "none"]
+    assert call(tmp_path, "--csv", tmp_path / "tables").exit_code == 0
 
 
 @pytest.mark.parametrize("state", ["failed", "waiting"])

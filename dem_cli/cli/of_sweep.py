@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-PICTURE_OPTIONS = {"file", "output", "what", "dpi", "force"}
+PICTURE_OPTIONS = {"file", "output", "what", "color", "dpi", "force"}
 
 
 def asked_for(files: Sequence[Path], each: bool = False) -> bool:
@@ -43,9 +43,17 @@ def report(path: Path, as_json: bool, folder: Path | None, each: bool, force: bo
 
 
 def render(
-    path: Path, output: Path | None, what: str | None, given: Collection[str], dpi: float | None, force: bool
+    path: Path,
+    output: Path | None,
+    what: str | None,
+    measure: str | None,
+    given: Collection[str],
+    dpi: float | None,
+    force: bool,
 ) -> None:
-    """A picture, by default in the sweep's folder; its name to stdout, what it shows to stderr. given: names of the options that are set."""
+    """A picture, by default in the sweep's folder; its name to stdout, what it shows to stderr. measure: that a map shows; given: names of
+    the options that are set.
+    """
     from dem_cli.errors import ScenarioError
     from dem_cli.report.look import check_target, save, style
     from dem_cli.report.sweep import read_sweep
@@ -56,9 +64,13 @@ def render(
     idle = sorted(set(given) - PICTURE_OPTIONS)
     if idle:
         raise ScenarioError(f"--{idle[0].replace('_', '-')} has no meaning for a sweep")
+    if measure and what != "map":
+        raise ScenarioError(f"--color has no meaning for --what {what} of a sweep, only for map")
     target = output or (path if path.is_dir() else path.parent) / f"{what}.png"
     check_target(target, force)
     found = read_sweep(path)
+    if measure:
+        found = found.by(measure)
     with style():
         _, caption, figure = draw(found, what)
         save(figure, target, dpi or 200.0)

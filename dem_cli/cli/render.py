@@ -120,7 +120,8 @@ def command(
 
     \b
     Of a SWEEP, its folder or sweep.toml:
-    map             the measure that counts over two axes of the sweep; over one axis curves (the default)
+    map             change of the void ratio, or --color MEASURE (named as in dem report --json), over two axes;
+                    over one axis curves (the default)
     resonance       the surface's motion over the driving period by T1
     shapes          shapes or scenarios side by side, before and after
 
@@ -146,7 +147,7 @@ def command(
 
     if of_sweep.asked_for([file]):
         options = {name for name, value in click.get_current_context().params.items() if value not in (None, False)}
-        of_sweep.render(file, output, what, options, dpi, force)
+        of_sweep.render(file, output, what, color, options, dpi, force)
         return
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from dem_cli.analysis.statistics import Estimate, estimate
-from dem_cli.errors import ResultsError
+from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.sweep_axes import SEED, Axis, axes_of
 from dem_cli.report.sweep_measures import MAIN, MEASURES, TABLES, Numbers, numbers_of
 from dem_cli.report.tree import plain
@@ -122,6 +122,15 @@ class Sweep:
             for one in self.entries
             if one.numbers and kind in (None, one.numbers.kind)
         )
+
+    def by(self, measure: str) -> Sweep:
+        """The same, ranked and mapped by another measure. ScenarioError if no member has it."""
+        from dem_cli.report.figures import unknown
+
+        known = [name for name in MEASURES if self.has(name)]
+        if measure not in known:
+            raise ScenarioError(unknown("measure", measure, known))
+        return dataclasses.replace(self, main=measure)
 
     def as_dict(self) -> dict[str, Any]:
         """Tree for JSON: SI units, null where a quantity is not defined; values of the axes as the manifest has them."""

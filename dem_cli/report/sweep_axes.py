@@ -13,7 +13,7 @@ from pathlib import PurePath
 from typing import Any
 
 from dem_cli import units
-from dem_cli.results.manifest import Manifest
+from dem_cli.results.manifest import Manifest, SweepAxis
 
 SEED, SCENARIO = "seed", "scenario"
 SHAKING = ("amplitude", "frequency")
@@ -24,7 +24,8 @@ UNIT = re.compile(r"\s*[+-]?[\d_.]+(?:[eE][+-]?\d+)?\s*(.*?)\s*", re.DOTALL)
 class Axis:
     """One thing that varies. keys: of the scenario, several where they go together; points: a value of each key, as TOML has it.
 
-    name: for people, without unit; texts: each point; values: as numbers in `unit`, None where some are no numbers.
+    name: for people, without unit; texts: each point; values: as numbers in `unit`, None where some are no numbers. Keys that go together
+    are named and numbered by one of them that tells the points apart, if there is one; with_others: texts with the others.
     """
 
     keys: tuple[str, ...]
@@ -33,6 +34,7 @@ class Axis:
     unit: str
     texts: tuple[str, ...]
     values: tuple[float, ...] | None
+    with_others: tuple[str, ...]
 
     @property
     def label(self) -> str:
@@ -50,25 +52,32 @@ class Axis:
     def words(self, k: int) -> str:
         """Point k so that it says what it is: 400 gal, friction 0.3, ellipse."""
         text = f"{self.texts[k]} {self.unit}".rstrip()
-        named = len(self.keys) == 1 and (self.values is not None or self.texts[k] in ("on", "off"))
+        named = self.values is not None or self.texts[k] in ("on", "off")
         if not named or (self.unit and self.name in SHAKING):
             return text
         return f"{self.name.rpartition('.')[2].replace('_', ' ')} {text}"
 
 
 def axes_of(manifest: Manifest) -> tuple[Axis, ...]:
-    """In the order of the manifest, seeds left out. Keys that go together are one axis, but for amplitude and frequency."""
+    """In the order of the manifest, seeds left out. Keys that go together are one axis, but amplitude and frequency are always two."""
     groups: list[tuple[tuple[str, ...], list[tuple[Any, ...]]]] = []
     for axis in manifest.axes:
         keys = [k for k, key in enumerate(axis.keys) if key != SEED]
-        apart = [[k] for k in keys] if {_last(axis.keys[k]) for k in keys} == set(SHAKING) else [keys]
-        for some in apart:
-            if some:
-                groups.append(
-                    (tuple(axis.keys[k] for k in some), [tuple(point[k] for k in some) for point in axis.points])
-                )
+        for some in _apart(axis, keys):
+            groups.append((tuple(axis.keys[k] for k in some), [tuple(point[k] for k in some) for point in axis.points]))
     names = [_short(key) for keys, _ in groups for key in keys]
     return tuple(_axis(keys, _with_members(keys, points, manifest), names) for keys, points in groups)
+
+
+def _apart(axis: SweepAxis, keys: list[int]) -> list[list[int]]:
+    """Which keys of an axis make an axis here; what goes with amplitude and frequency only if these do not tell the points apart."""
+    shaking = [k for name in SHAKING for k in keys if _last(axis.keys[k]) == name]
+    if len(shaking) != 2:
+        return [keys] if keys else []
+    others = [k for k in keys if k not in shaking]
+    told = {_token([point[k] for k in keys]) for point in axis.points}
+    pairs = {_token([point[k] for k in shaking]) for point in axis.points}
+    return [[shaking[0]], [shaking[1]], *([others] if others and len(pairs) < len(told) else [])]
 
 
 def _with_members(
@@ -81,19 +90,35 @@ def _with_members(
 
 def _axis(keys: tuple[str, ...], points: tuple[tuple[Any, ...], ...], names: Sequence[str]) -> Axis:
     shown = [_short(key) if names.count(_short(key)) == 1 else key for key in keys]
-    if len(keys) > 1:
-        texts = tuple(
-            ", ".join(f"{name} {_text(value)}" for name, value in zip(shown, point, strict=True)) for point in points
-        )
-        return Axis(keys, points, " & ".join(shown), "", texts, None)
-    column = [point[0] for point in points]
+    columns = [tuple(point[k] for point in points) for k in range(len(keys))]
+    chief = _chief(keys, columns)
+    every = tuple(
+        ", ".join(f"{name} {_text(value)}" for name, value in zip(shown, point, strict=True)) for point in points
+    )
+    if chief is None:
+        return Axis(keys, points, " & ".join(shown), "", every, None, every)
+    column = columns[chief]
     unit, values = _numbers(column)
     texts = tuple(f"{value:.6g}" for value in values) if values is not None else tuple(_text(value) for value in column)
     if keys == (SCENARIO,):
         texts = tuple(PurePath(str(value)).stem for value in column)
     if len(set(texts)) < len(texts):
         texts = tuple(str(value) for value in values or column)
-    return Axis(keys, points, shown[0], unit, texts, values)
+    return Axis(keys, points, shown[chief], unit, texts, values, every if len(keys) > 1 else texts)
+
+
+def _chief(keys: tuple[str, ...], columns: Sequence[tuple[Any, ...]]) -> int | None:
+    """Of keys that go together the one that the axis is named and numbered by: it has other numbers at each point."""
+    if len(keys) == 1:
+        return 0
+    found = []
+    for k, column in enumerate(columns):
+        values = _numbers(column)[1]
+        if values is not None and len(set(values)) == len(values):
+            found.append(k)
+    return next(
+        (k for name in ("frequency", "amplitude") for k in found if _last(keys[k]) == name), next(iter(found), None)
+    )
 
 
 def _numbers(column: Sequence[Any]) -> tuple[str, tuple[float, ...] | None]:

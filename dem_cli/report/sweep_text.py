@@ -48,7 +48,8 @@ def _head(found: Sweep) -> Block:
     begun_text = f" ({begun} begun)" if begun else ""
     seeds = sorted({one.seed for one in found.entries if one.seed is not None})
     rows = [("sweep", str(found.folder)), ("scenario", found.scenario)]
-    rows += [(f"varies {axis.label}", " | ".join(axis.texts)) for axis in found.axes]
+    for axis in found.axes:
+        rows.append((f"{'varies' if axis.varies else 'all with'} {axis.label}", " | ".join(axis.with_others)))
     if found.repeated:
         rows.append(("seeds", ", ".join(map(str, seeds))))
     members = "1 member" if len(found.entries) == 1 else f"{len(found.entries)} members"
@@ -164,7 +165,7 @@ def _known(found: Sweep) -> list[str]:
 
 
 def _keys(found: Sweep) -> list[str]:
-    return [key for axis in found.axes for key in axis.keys]
+    return list(dict.fromkeys(key for case in found.cases for key in case.settings))
 
 
 def _cases_table(found: Sweep) -> Iterator[Row]:
