@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 MANY = 10_000  # members that nobody means by accident
 MOST_FAILED = 50  # rows of the table of what failed
+FEW = 10  # preparations that are listed one by one
 
 
 @click.command(name="sweep", short_help="Run a scenario over a grid of its keys, on all cores or a cluster.")
@@ -204,14 +205,14 @@ def _list(plan: Plan, folder: Path, jobs: int) -> None:
         rows.append((*(str(one.settings[key]) for key in keys), "invalid", "", one.error))
     whole = sum(guess.members[one.hash] for one in open_members) + sum(guess.preparations[key] for key in needed)
     title = f"{plan.title}: {len(plan.members) + len(plan.invalid)} members, {len(done)} done; folder {folder}"
-    lines = []
-    for key in sorted(needed, key=list(plan.shared).index):
-        shared = plan.shared[key]
-        lines.append((shared.label, clock(guess.preparations[key])))
+    shared = [one for key, one in plan.shared.items() if key in needed]
+    lines = [(one.label, clock(guess.preparations[one.key])) for one in shared[:FEW]]
+    if more := shared[FEW:]:
+        lines.append((f"and {len(more)} more such", clock(sum(guess.preparations[one.key] for one in more))))
     basis = (
         "guessed"
         if guess.pace is None
-        else f"guessed, {guess.pace:.2g} times as long as dem check says, as the members that are done"
+        else f"guessed, {guess.pace:.3g} times as long as dem check says, as the members that are done"
     )
     lines.append((f"in all, {basis}", f"{clock(whole)} of one core, {clock(whole / jobs)} on {jobs}"))
     header = (*(key.rpartition(".")[2] for key in keys), "state", "time", "file")

@@ -146,7 +146,7 @@ def _failed(found: Sweep) -> Block:
 def _waiting(found: Sweep) -> Block:
     count = found.counts["waiting"]
     points = sum("done" not in case.counts for case in found.cases)
-    text = f"{count} of {len(found.entries)} members have not been run; dem sweep --resume goes on"
+    text = f"{count} of {len(found.entries)} members have not been run; the same dem sweep goes on"
     if points and found.repeated:
         text += f". Points without any result: {points} of {len(found.cases)}"
     return Block("Waiting", (), ((text,),) if count else ())
