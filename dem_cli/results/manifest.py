@@ -121,7 +121,7 @@ def write_manifest(manifest: Manifest) -> None:
         "scenario": manifest.scenario,
         **({"former": list(manifest.former)} if manifest.former else {}),
         "axis": [
-            {"kind": axis.kind, "values": dict(zip(axis.keys, zip(*axis.points, strict=True), strict=True))}
+            {"kind": axis.kind, "values": {key: [point[k] for point in axis.points] for k, key in enumerate(axis.keys)}}
             for axis in manifest.axes
         ],
         "member": [_of_member(member) for member in manifest.members],
