@@ -369,20 +369,9 @@ def test_text_of_a_sweep(tmp_path: Path) -> None:
 
 def test_each_run_has_a_row_when_it_is_asked_for(found: Sweep) -> None:
     rows = [line.split() for line in text_of(found, each=True).splitlines() if line.endswith(".h5")]
-    assert len(rows) == 2 * 32
-    assert rows[0] == [
-        "disc",
-        "400",
-        "1",
-        "1",
-        "0.2090",
-        "0.2069",
-        "-0.0021",
-        "17.29",
-        "17.14",
-        "-0.14",
-        "disc-400-1-1.h5",
-    ]
+    assert len(rows) == 3 * 32
+    assert rows[0] == ["disc", "400", "1", "1", "0.2090", "0.2069", "-0.0021", "2.50", "disc-400-1-1.h5"]
+    assert rows[32][4:7] == ["17.29", "17.14", "-0.14"]
     assert "each run" not in text_of(found)
 
 

@@ -64,7 +64,7 @@ MEASURES: dict[str, Measure] = {
     "driving_amplitude": Measure("amplitude of the shaking [gal]", ".4g", 100.0, spread=False),
     "quiet": Measure("amplitude of a still surface, at most [mm]", ".2g", 1e3, spread=False),
     "escaped": Measure("escaped", ".3g", spread=False),
-    "overlap": Measure("largest overlap/radius", ".1e", spread=False),
+    "overlap": Measure("largest overlap/radius", ".1e", column="overlap/radius", spread=False),
     "wall_time": Measure("wall time [s]", ".3g", spread=False),
     "void_ratio": Measure("void ratio at the start", ".4f", best=DENSE),
     "peak_ratio": Measure("peak s1/s2", ".4f", best=("largest", "highest peak")),
@@ -95,18 +95,14 @@ MAIN: dict[Kind, tuple[str, ...]] = {
 # Kind of run -> title of a table and its columns; those that no run has are left out.
 TABLES: dict[Kind, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "time": (
+        ("Void ratio and settlement", ("void_ratio_packed", "void_ratio_shaken", "void_ratio_change", "settlement")),
         (
-            "Void ratio and porosity, packed and shaken",
-            (
-                "void_ratio_packed", "void_ratio_shaken", "void_ratio_change", "porosity_packed", "porosity_shaken", "porosity_change",
-            ),
+            "Porosity",
+            ("porosity_packed", "porosity_shaken", "porosity_change", "depth_packed", "escaped", "overlap", "wall_time"),
         ),
         (
-            "Settlement; mode cos(pi x/l) of the surface in the last shaking, T1 of a liquid as deep",
-            (
-                "depth_packed", "settlement", "period_ratio", "driven_amplitude", "driven_ratio", "period", "amplitude", "escaped",
-                "wall_time",
-            ),
+            "Surface: mode cos(pi x/l) in the last shaking, T1 of a liquid as deep",
+            ("period_ratio", "driven_amplitude", "driven_ratio", "period", "amplitude"),
         ),
     ),
     "increment": (
