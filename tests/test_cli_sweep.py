@@ -53,6 +53,7 @@ def test_members_are_what_dem_run_gives(swept: Path, tmp_path: Path) -> None:
     ]
     found = CliRunner().invoke(main, ["run", str(swept / "box.toml"), *args, "--set", "title=small [800 gal, 20 Hz]"])
     assert found.exit_code == 0
+    assert "its table [sweep] is left aside: dem sweep runs that" in found.stderr
     (member,) = (swept / "out").glob("800gal-20Hz-*.h5")
     assert_same(tmp_path / "one.h5", member)
 
