@@ -17,8 +17,15 @@ import click
     metavar="DIR",
     help="Also write the tables as CSV into DIR.",
 )
-@click.option("--force", is_flag=True, help="Overwrite CSV tables that exist.")
-def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: bool) -> None:
+@click.option(
+    "--html",
+    "page",
+    type=click.Path(path_type=Path),
+    metavar="PAGE",
+    help="Also write a page to look at: tables, figures, and the grains in motion.",
+)
+@click.option("--force", is_flag=True, help="Overwrite CSV tables and a page that exist.")
+def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, page: Path | None, force: bool) -> None:
     """Print what result FILEs say.
 
     One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
@@ -28,7 +35,8 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
     get a row of their mean. --json prints an object for one FILE and a list for several; its keys are those of
     the dataclasses in dem_cli/report/summary.py, of shear tests shear.py, of bodies impulse.py. --csv writes
     series.csv, stages.csv, surface.csv (shear tests: dissipation.csv; bodies: check.csv, runout.csv) and
-    tracks.csv; with several FILEs into one folder a file below DIR.
+    tracks.csv; with several FILEs into one folder a file below DIR. --html writes PAGE: one file for a browser
+    that fetches nothing, with the tables, figures, scenario and provenance, and a player of the frames.
     """
     # Imported here so that `dem --help` stays quick.
     import json
@@ -38,6 +46,8 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
     from dem_cli.report.kinds import kind_of
     from dem_cli.results import BodyResults, open_results
 
+    if page is not None:
+        _check_page(page, force)
     kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
     runs, tests, bodies = [], [], []
@@ -72,3 +82,20 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
         text.show(found, sys.stdout)
     else:
         text.show(shear_text.blocks(tests[0]) if len(tests) == 1 else [shear_text.comparison(tests)], sys.stdout)
+    if page is not None:
+        _write_page(files, page)
+
+
+def _check_page(page: Path, force: bool) -> None:
+    """Before anything is read: a name that will not do is told at once."""
+    from dem_cli.report.page.render import check_page
+
+    check_page(page, force)
+
+
+def _write_page(files: tuple[Path, ...], page: Path) -> None:
+    from dem_cli.report.page.build import file_page
+    from dem_cli.report.page.render import write_page
+
+    write_page(file_page(files), page)
+    click.echo(f"wrote {page}", err=True)
