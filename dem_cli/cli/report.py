@@ -35,8 +35,9 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, page: P
     get a row of their mean. --json prints an object for one FILE and a list for several; its keys are those of
     the dataclasses in dem_cli/report/summary.py, of shear tests shear.py, of bodies impulse.py. --csv writes
     series.csv, stages.csv, surface.csv (shear tests: dissipation.csv; bodies: check.csv, runout.csv) and
-    tracks.csv; with several FILEs into one folder a file below DIR. --html writes PAGE: one file for a browser
-    that fetches nothing, with the tables, figures, scenario and provenance, and a player of the frames.
+    tracks.csv; with several FILEs into one folder a file below DIR. --html writes PAGE, of FILEs or of the
+    folder of a sweep: one file for a browser that fetches nothing, with the tables, figures, scenario and
+    provenance, and a player of the frames.
     """
     # Imported here so that `dem --help` stays quick.
     import json
@@ -45,9 +46,13 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, page: P
     from dem_cli.report import export, impulse, impulse_csv, impulse_text, shear, shear_text, summary, text
     from dem_cli.report.kinds import kind_of
     from dem_cli.results import BodyResults, open_results
+    from dem_cli.results.manifest import is_sweep
 
     if page is not None:
         _check_page(page, force)
+        if len(files) == 1 and is_sweep(files[0]):
+            _sweep(files[0], page)
+            return
     kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
     runs, tests, bodies = [], [], []
@@ -98,4 +103,19 @@ def _write_page(files: tuple[Path, ...], page: Path) -> None:
     from dem_cli.report.page.render import write_page
 
     write_page(file_page(files), page)
+    click.echo(f"wrote {page}", err=True)
+
+
+def _sweep(folder: Path, page: Path) -> None:
+    """The page of a sweep; its members on stdout."""
+    import sys
+
+    from dem_cli.report import text
+    from dem_cli.report.page.build import axes_of, members, sweep_page
+    from dem_cli.report.page.render import write_page
+    from dem_cli.results.manifest import read_manifest
+
+    manifest = read_manifest(folder)
+    text.show([*axes_of(manifest), members(manifest)], sys.stdout)
+    write_page(sweep_page(manifest), page)
     click.echo(f"wrote {page}", err=True)

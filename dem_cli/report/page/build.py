@@ -181,7 +181,8 @@ def comparison(files: Sequence[Path]) -> tuple[list[Block], list[Drawing], list[
             "Before and after shaking",
             "Void ratio and roughness packed (ring) and after shaking (dot), and airborne grains, of each case",
         )
-        if len({case.sine for case in found.cases if case.sine}) > 1:
+        sines = [case.sine for case in found.cases if case.sine]
+        if min((len(set(values)) for values in zip(*sines, strict=True)), default=0) > 1:
             drawings += _tried(
                 lambda: compare_figures.draw_grid(found.cases),
                 "Change of the void ratio",

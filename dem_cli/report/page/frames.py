@@ -17,7 +17,7 @@ from dem_cli.results import Results
 from dem_cli.state import Floats, Ints
 
 Pack = Callable[[list[int]], tuple[Packer, dict[str, Any]]]  # places within what was read -> sections and facts of them
-AHEAD = 1.6  # frames that are read and tried, over those that would fit if nothing could be compressed
+AHEAD = 2.5  # frames that are read and tried, over those that would fit if nothing could be compressed; more would only take time
 
 
 def spread(count: int, most: int) -> list[int]:

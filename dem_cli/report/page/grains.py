@@ -22,9 +22,9 @@ LOGS = (
 )  # fmt: skip
 # Made from those in the page: quantity -> how, of which.
 DERIVED = {
-    "displacement": ("hypot", "displacement_x", "displacement_y"),
-    "pressure": ("mean", "stress_xx", "stress_yy"),
-    "shear_stress": ("shear", "stress_xx", "stress_yy", "stress_xy"),
+    "displacement": ["hypot", "displacement_x", "displacement_y"],
+    "pressure": ["mean", "stress_xx", "stress_yy"],
+    "shear_stress": ["shear", "stress_xx", "stress_yy", "stress_xy"],
 }
 TOLD = {
     "ground_x": "displacement of the container in x", "ground_y": "displacement of the container in y",

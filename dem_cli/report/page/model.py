@@ -13,15 +13,25 @@ from dem_cli.report.text import Block
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture with its heading, caption and what it says to those who cannot see it. content: of an SVG or PNG file. wide: too
-    wide to be read in half of the page."""
+    """A picture with its heading, caption and what it says to those who cannot see it. content: of an SVG or PNG file. size:
+    width and height [inch]."""
 
     title: str
     caption: str
     alt: str
     kind: Literal["svg+xml", "png"]
     content: bytes
-    wide: bool = False
+    size: tuple[float, float]
+
+    @property
+    def width(self) -> int:
+        """As it is shown where there is room [pixels of 1/96 inch]."""
+        return round(96.0 * self.size[0])
+
+    @property
+    def wide(self) -> bool:
+        """Too wide to be read in half of the page."""
+        return self.size[0] > max(9.0, 1.7 * self.size[1])
 
     @property
     def address(self) -> str:

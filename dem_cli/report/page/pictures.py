@@ -53,12 +53,12 @@ FEW = ("sample", "scene", "series", "stress-strain")  # of each of several files
 
 def drawing(figure: Figure, title: str, caption: str, alt: str) -> Drawing:
     """A figure for the page. Call inside `look.style()`."""
-    wide = figure.get_figwidth() > max(9.0, 1.7 * figure.get_figheight())
+    size = (float(figure.get_figwidth()), float(figure.get_figheight()))
     vector = _saved(figure, "svg")
     image = b"" if len(vector) <= SMALL else _saved(figure, "png")
     if image and len(image) < len(vector):
-        return Drawing(title, caption, alt, "png", image, wide)
-    return Drawing(title, caption, alt, "svg+xml", vector, wide)
+        return Drawing(title, caption, alt, "png", image, size)
+    return Drawing(title, caption, alt, "svg+xml", vector, size)
 
 
 def _saved(figure: Figure, kind: Literal["svg", "png"]) -> bytes:

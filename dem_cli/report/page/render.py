@@ -18,9 +18,12 @@ SCRIPTS = ("codec.js", "colors.js", "grains.js", "bodies.js", "player.js", "page
 
 
 def check_page(path: Path, force: bool) -> None:
-    """Raise ScenarioError if `path` has another ending than ENDINGS, ResultsError if it would be overwritten without `force`."""
+    """Raise ScenarioError if `path` has another ending than ENDINGS, ResultsError if it would be overwritten without
+    `force` or its folder is missing."""
     if path.suffix.lower() not in ENDINGS:
         raise ScenarioError(f"{path}: a page's name must end in {' or '.join(ENDINGS)}")
+    if not path.parent.is_dir():
+        raise ResultsError(f"{path}: there is no folder {path.parent}")
     if path.exists() and not force:
         raise ResultsError(f"{path} exists; choose another name or add --force")
 
