@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SMALL = 120_000  # bytes of an SVG that no PNG is tried against
+BYTES_A_GRAIN = 300  # of an SVG, at least
 DPI = 150.0
 
 # Kind of picture -> its heading, and what it shows.
@@ -51,11 +52,16 @@ OF_BODIES = ("scene", "series", "energy", "check", "runout", "histories", "traje
 FEW = ("sample", "scene", "series", "stress-strain")  # of each of several files
 
 
-def drawing(figure: Figure, title: str, caption: str, alt: str) -> Drawing:
-    """A figure for the page. Call inside `look.style()`."""
+def drawing(figure: Figure, title: str, caption: str, alt: str, *, grains: int = 0) -> Drawing:
+    """A figure for the page. grains: that it draws one by one. Call inside `look.style()`."""
     size = (float(figure.get_figwidth()), float(figure.get_figheight()))
+    # What is certain not to be the smaller is not made: the vectors of many grains, the image of a small drawing.
+    image = _saved(figure, "png") if grains else b""
+    if image and len(image) <= BYTES_A_GRAIN * grains:
+        return Drawing(title, caption, alt, "png", image, size)
     vector = _saved(figure, "svg")
-    image = b"" if len(vector) <= SMALL else _saved(figure, "png")
+    if len(vector) > SMALL and not image:
+        image = _saved(figure, "png")
     if image and len(image) < len(vector):
         return Drawing(title, caption, alt, "png", image, size)
     return Drawing(title, caption, alt, "svg+xml", vector, size)
@@ -66,6 +72,7 @@ def _saved(figure: Figure, kind: Literal["svg", "png"]) -> bytes:
     with io.BytesIO() as stream, warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure.savefig(stream, format=kind, dpi=DPI, metadata=metadata)
+        figure.set_layout_engine("none")  # it is laid out now; doing that again takes as long as drawing
         return stream.getvalue()
 
 
@@ -81,7 +88,9 @@ def pictures(results: Results, *, few: bool = False) -> list[Part]:
             missing.append(f"{title.lower()} ({str(error).removeprefix(f'{results.path}: ')})")
             continue
         state = "" if results.complete else " Incomplete run."
-        found.append(drawing(figure, title, f"{shows[0].upper()}{shows[1:]}.{state}", f"{title}: {shows}.{state}"))
+        grains = results.element_count if what in ("sample", "scene") else 0
+        caption = f"{shows[0].upper()}{shows[1:]}.{state}"
+        found.append(drawing(figure, title, caption, f"{title}: {shows}.{state}", grains=grains))
     return [*found, Note(f"Not drawn: {'; '.join(missing)}.")] if missing else found
 
 
