@@ -13,19 +13,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+import quasi_static_samples as shear
 import report_samples as made
 import scene_samples as solid
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from shape_samples import shaped
 
 from dem_cli.cli.report import command
 from dem_cli.errors import DemError
 from dem_cli.report import text
+from dem_cli.report.look import new_figure, style
 from dem_cli.report.page import codes, frames
 from dem_cli.report.page.build import comparison, file_page, sweep_page
 from dem_cli.report.page.frames import spread
 from dem_cli.report.page.grains import grain_player
 from dem_cli.report.page.model import Drawing, Page, Player, Section
+from dem_cli.report.page.pictures import drawing
 from dem_cli.report.page.render import html
 from dem_cli.report.page.rigid import body_player
 from dem_cli.report.quantities import QUANTITIES
@@ -171,15 +175,30 @@ def test_same_file_gives_the_same_page(path: Path, source: str) -> None:
     assert html(file_page([path])) == source
 
 
-def test_pictures_are_the_smaller_of_two(page: Page) -> None:
+def a_figure(points: int) -> Figure:
+    figure = new_figure(4.0, 2.0)
+    ax = figure.add_subplot()
+    for k in range(points):
+        ax.plot([0.1 * k, 0.1 * k + 1.0], [k % 7, k % 5], color=(0.5, k / points, 0.2))
+    return figure
+
+
+@pytest.mark.parametrize(
+    ("points", "grains", "kind"), [(5, 0, "svg+xml"), (1500, 0, "png"), (1500, 1500, "png"), (5, 5, "png")]
+)
+def test_pictures_are_the_smaller_of_two(points: int, grains: int, kind: str) -> None:
+    with style():
+        one = drawing(a_figure(points), "title", "caption", "alt", grains=grains)
+    assert one.kind == kind
+    assert one.content.startswith(b"\x89PNG" if kind == "png" else b"<?xml")
+    assert base64.b64decode(one.address.partition(",")[2]) == one.content
+    assert (one.width, one.wide) == (384, False)
+
+
+def test_every_picture_is_small(page: Page) -> None:
     drawings = [part for section in page.sections for part in section.parts if isinstance(part, Drawing)]
-    for one in drawings:
-        if one.kind == "png":
-            assert one.content.startswith(b"\x89PNG")
-        else:
-            assert b"<svg" in one.content
-        assert base64.b64decode(one.address.partition(",")[2]) == one.content
-        assert len(one.content) < 400_000
+    assert len(drawings) >= 6
+    assert max(len(one.content) for one in drawings) < 400_000
 
 
 def test_incomplete_run_is_told_at_the_top(tmp_path: Path) -> None:
@@ -286,6 +305,21 @@ def test_walls_and_bonds_are_the_file_s(grains: Path) -> None:
         assert np.array_equal(
             found["bonds"].reshape(-1, 2), np.stack([results.bonds.i, results.bonds.j], axis=1).reshape(-1, 2)
         )
+
+
+def test_walls_of_tests_move_with_their_frames(tmp_path: Path) -> None:
+    """Over increments: walls of each frame, boundary grains counted, no speed."""
+    with open_results(shear.write_test(tmp_path / "ring.h5", increments=10, ring=True)) as results:
+        assert players(results).facts["boundary"] == results.boundary > 0
+    with open_results(shear.write_test(tmp_path / "walls.h5", increments=10)) as results:
+        player = players(results)
+        found = decoded(player)
+        assert player.facts["axis"] == "increment"
+        assert "speed" not in found
+        for k in range(results.n_frames):
+            w = results.frame(k).walls
+            ends = np.stack([w.x0, w.y0, w.x1, w.y1], axis=1).astype(np.float32)
+            assert np.array_equal(np.reshape(found["walls"][k], (-1, 4)), ends)
 
 
 def test_bodies_are_the_file_s(tmp_path: Path) -> None:
@@ -432,3 +466,4 @@ def test_command_refuses_names(path: Path, tmp_path: Path, name: str) -> None:
     result = CliRunner().invoke(command, [str(path), "--html", str(tmp_path / name)])
     assert isinstance(result.exception, DemError)
     assert "\n" not in str(result.exception)
+    assert result.stdout == ""  # told before any work

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import quasi_static_samples as shear
 import report_samples as made
 import scene_samples as solid
 from PIL import Image
@@ -75,12 +76,13 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Result files and the pages of their players: grains (a file of 11 frames), pairs, ellipses and bodies."""
+    """Result files and the pages of their players: grains (a file of 11 frames), pairs, ellipses, clumps, bodies and a shear test."""
     folder = tmp_path_factory.mktemp("pages")
     made.make_file(folder / "grains.h5", interval=0.05, frames=11, tracks=None, title="Grains <by> formula")
     for shape in ("bonded", "ellipse", "clump"):
         made.make_file(folder / f"{shape}.h5", sample=shaped(shape, 6, 5), interval=0.05, tracks=None)
     solid.write_all(folder / "bodies.h5")
+    shear.write_test(folder / "increments.h5", increments=10)
     for path in folder.glob("*.h5"):
         with open_results(path) as results:
             parts = (Note("before"), *_player(results, 10_000_000))
@@ -176,7 +178,7 @@ def number(text: str) -> float:
     return float(found.group(1)) * SI[found.group(2)]
 
 
-@pytest.mark.parametrize("name", ["grains", "bonded", "ellipse", "clump", "bodies"])
+@pytest.mark.parametrize("name", ["grains", "bonded", "ellipse", "clump", "bodies", "increments"])
 def test_every_kind_is_drawn_without_errors(opened: Callable[[str], Player], name: str) -> None:
     player = opened(name)
     pictures = []

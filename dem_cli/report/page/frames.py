@@ -91,8 +91,8 @@ def readouts(results: Results, shown: Sequence[int], columns: Mapping[str, str])
             continue
         column = results.series[name]
         values = column[rows]
-        # Rounding is no motion of the ground.
-        values = np.where(np.abs(values) < 1e-9 * np.nanmax(np.abs(column), initial=0.0), 0.0, values)
+        if name.startswith("ground"):  # rounding is no motion
+            values = np.where(np.abs(values) < 1e-9 * np.nanmax(np.abs(column), initial=0.0), 0.0, values)
         if np.any(np.nan_to_num(values) != 0.0):
             found.append({"label": label, "unit": results.series.unit(name), "values": _plain(values)})
     return found

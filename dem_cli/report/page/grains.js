@@ -12,6 +12,7 @@ class GrainPainter {
     this.a = this.data.whole("a");
     this.b = this.data.whole("b");
     this.body = this.data.whole("body");
+    this.mean = this.radius.reduce((sum, r) => sum + r, 0) / Math.max(this.radius.length, 1);
     this.bonds = this.data.whole("bonds");
     this.view = null; // {x, y: centre [m], scale: pixels a metre}
     this.own = false; // whether the user has moved the view
@@ -114,7 +115,7 @@ class GrainPainter {
     const px = new Float64Array(n);
     const py = new Float64Array(n);
     for (let k = 0; k < n; k++) [px[k], py[k]] = this.screen(x[k], y[k]);
-    const edges = n <= MOST_EDGES && this.radius[0] * s > 1.2;
+    const edges = n <= MOST_EDGES && this.mean * s > 1.2;
     ctx.lineWidth = edges ? 1 : 0;
     ctx.strokeStyle = look.edge;
     // Members of a grain stand in a row: their outlines first, then their faces, so that only the grain's own outline stays.
@@ -155,7 +156,7 @@ class GrainPainter {
 
   drawBonds(ctx, px, py, shown, look) {
     ctx.strokeStyle = look.ink;
-    ctx.lineWidth = Math.min(Math.max(0.25 * this.radius[0] * this.view.scale, 0.5), 4);
+    ctx.lineWidth = Math.min(Math.max(0.25 * this.mean * this.view.scale, 0.5), 4);
     ctx.beginPath();
     const line = (i, j) => {
       if (!shown[i] || !shown[j]) return;
@@ -172,7 +173,7 @@ class GrainPainter {
     const contacts = contactsOf(this.data, this.starts, frame, this.facts.count);
     const widest = this.player.widest(frame);
     if (!(widest > 0) || !contacts.count) return "No contacts carry force here.";
-    const most = Math.min(Math.max(0.9 * this.radius[0] * this.view.scale, 1.5), 7);
+    const most = Math.min(Math.max(0.8 * this.mean * this.view.scale, 1.5), 6);
     const bins = Array.from({ length: 24 }, () => []);
     for (let c = 0; c < contacts.count; c++) {
       const share = Math.min(contacts.force[c] / widest, 1);
@@ -194,7 +195,7 @@ class GrainPainter {
       const width = (most * (k + 0.5)) / 24;
       ctx.strokeStyle = look.halo;
       ctx.lineWidth = width + Math.min(width, 1.5);
-      if (bin.length && this.radius[0] * this.view.scale > 3) path(bin);
+      if (bin.length && width > 0.7) path(bin);
     });
     bins.forEach((bin, k) => {
       ctx.strokeStyle = look.chain;

@@ -66,7 +66,7 @@ class Player {
     this.noun = bodies ? "body" : facts.several ? "disc" : "grain";
     this.part("noun").textContent = this.noun[0].toUpperCase() + this.noun.slice(1);
     this.part("dragging").textContent = this.painter.mayDrag;
-    this.part("grain").max = String(Math.max(...this.ids));
+    this.part("grain").max = String(this.ids.reduce((most, id) => Math.max(most, id), 0));
   }
 
   listen() {
@@ -322,7 +322,7 @@ class Player {
 
   resize() {
     const width = Math.max(this.canvas.parentElement.clientWidth, 50);
-    const height = Math.min(Math.max(this.aspect * width, 260), Math.max(0.72 * window.innerHeight, 260));
+    const height = Math.min(Math.max(this.aspect * width, 220), Math.max(0.72 * window.innerHeight, 220));
     if (width === this.width && height === this.height) return;
     [this.width, this.height] = [width, height];
     const ratio = window.devicePixelRatio || 1;
@@ -425,9 +425,11 @@ class Player {
     const known = k >= 0 && this.data.row("shown", this.frame)[k];
     const title = this.part("grain-title");
     const name = this.noun[0].toUpperCase() + this.noun.slice(1);
-    if (k < 0) title.textContent = `No ${this.noun} chosen: point at one, or give its number`;
+    if (k < 0) title.textContent = `No ${this.noun} chosen: point at one`;
     else title.textContent = known ? `${name} ${this.ids[k]}` : `${name} ${this.ids[k]} has escaped`;
-    fillRows(this.part("facts"), known ? this.painter.rows(k, this.frame) : []);
+    // The same rows without numbers where there is none, so that the page keeps its height.
+    const rows = this.painter.rows(known ? k : 0, this.frame);
+    fillRows(this.part("facts"), known ? rows : rows.map(([label]) => [label, "-"]));
   }
 }
 
