@@ -190,16 +190,17 @@ class GrainPainter {
       }
       ctx.stroke();
     };
-    ctx.lineCap = "round";
+    const widths = bins.map((_, k) => (most * (k + 0.5)) / 24);
+    ctx.strokeStyle = look.halo; // thin lines need none, and there are many of them
     bins.forEach((bin, k) => {
-      const width = (most * (k + 0.5)) / 24;
-      ctx.strokeStyle = look.halo;
-      ctx.lineWidth = width + Math.min(width, 1.5);
-      if (bin.length && width > 0.7) path(bin);
+      ctx.lineWidth = widths[k] + Math.min(widths[k], 1.5);
+      ctx.lineCap = "round";
+      if (bin.length && widths[k] > 1) path(bin);
     });
+    ctx.strokeStyle = look.chain;
     bins.forEach((bin, k) => {
-      ctx.strokeStyle = look.chain;
-      ctx.lineWidth = (most * (k + 0.5)) / 24;
+      ctx.lineWidth = widths[k];
+      ctx.lineCap = widths[k] > 1 ? "round" : "butt";
       if (bin.length) path(bin);
     });
     ctx.lineCap = "butt";
