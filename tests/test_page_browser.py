@@ -78,6 +78,7 @@ def browser() -> Iterator[Any]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Result files and the pages of their players: grains (a file of 11 frames), pairs, ellipses, clumps, bodies and a shear test."""
     folder = tmp_path_factory.mktemp("pages")
+    made.make_file(folder / "single.h5", interval=0.05, frames=1, tracks=None)
     made.make_file(folder / "grains.h5", interval=0.05, frames=11, tracks=None, title="Grains <by> formula")
     for shape in ("bonded", "ellipse", "clump"):
         made.make_file(folder / f"{shape}.h5", sample=shaped(shape, 6, 5), interval=0.05, tracks=None)
@@ -198,6 +199,19 @@ def test_every_kind_is_drawn_without_errors(opened: Callable[[str], Player], nam
     assert [entry for entry in player.browser.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")] == []
 
 
+def test_single_frame(opened: Callable[[str], Player]) -> None:
+    """There is nothing to play, and each quantity has its colours all the same."""
+    player = opened("single")
+    pictures = []
+    for name in ("radius", "coordination"):
+        player.choose("color", name)
+        pictures.append(player.pixels())
+        assert len(np.unique(pictures[-1].reshape(-1, 4), axis=0)) > 10
+    assert not np.array_equal(*pictures)
+    player.part("play").click()
+    assert player.root("player.playing") is False
+
+
 def test_it_asks_for_nothing_but_itself(opened: Callable[[str], Player]) -> None:
     player = opened("grains")
     assert player.script("return performance.getEntriesByType('resource').map((r) => r.name)") == []
@@ -237,6 +251,10 @@ def test_keyboard(opened: Callable[[str], Player]) -> None:
     assert player.root("player.playing") is False
     before = player.pixels()
     player.drawn(lambda: player.press("+"))
+    assert not np.array_equal(player.pixels(), before)
+    before = player.pixels()
+    held = ActionChains(player.browser).key_down(Keys.SHIFT).send_keys(Keys.ARROW_UP).key_up(Keys.SHIFT)
+    player.drawn(held.perform)
     assert not np.array_equal(player.pixels(), before)
     player.press(Keys.END)
     player.shows(10)
@@ -303,6 +321,26 @@ TOLD = {
     "rotation since the stage began": "rotation", "mean stress": "pressure", "largest shear stress": "shear_stress",
     "stress xx": "stress_xx", "stress xy": "stress_xy",
 }  # fmt: skip
+
+
+def test_pointer_on_bodies(opened: Callable[[str], Player], folder: Path) -> None:
+    """The numbers of a body in 3D; dragging turns the scene."""
+    player = opened("bodies")
+    with open_results(folder / "bodies.h5") as results:
+        frame = results.frame(-1)
+        k = int(np.flatnonzero(~frame.bodies.escaped)[-1])
+        player.script(f"document.querySelector('.player').player.select({k})")
+        player.wait(lambda: player.part("grain-title").text == f"Body {k}")
+        told = player.rows("facts")
+        for axis, name in enumerate("xyz"):
+            ends = [results.frame(n).bodies.x[:, axis] for n in range(results.n_frames)]
+            quantum = float(np.ptp(ends)) / 65534
+            assert number(told[name]) == pytest.approx(frame.bodies.x[k, axis], rel=1e-4, abs=quantum)
+        assert number(told["speed"]) == pytest.approx(float(np.linalg.norm(frame.bodies.v[k])), rel=1e-3)
+        assert told["kind"] == results.groups[frame.bodies.group[k]]
+    before = player.pixels()
+    player.drawn(ActionChains(player.browser, duration=0).drag_and_drop_by_offset(player.canvas, 60, 20).perform)
+    assert not np.array_equal(player.pixels(), before)
 
 
 def test_frame_is_told(opened: Callable[[str], Player], folder: Path) -> None:

@@ -16,7 +16,7 @@ class BodyPainter {
     this.starts = startsOf(this.data.whole("contacts"));
     this.reach = Array.from({ length: this.facts.shapes }, (_, k) => this.reachOf(k));
     this.sprites = new Map();
-    this.mayDrag = "turns (with shift: moves)";
+    this.mayDrag = "turns the scene (dragging with shift moves it)";
     this.turn();
   }
 
@@ -62,6 +62,7 @@ class BodyPainter {
   bounds(frame) {
     const key = `${this.player.scaleKey(frame)} ${this.angles}`;
     if (!this.fits.has(key)) {
+      if (this.fits.size > 50) this.fits.clear(); // there is one for each way that the scene was turned
       const box = [Infinity, -Infinity, Infinity, -Infinity];
       const hold = (x, y, z, r) => {
         const [u, v] = this.flat(x, y, z);

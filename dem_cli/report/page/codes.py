@@ -88,7 +88,7 @@ class Packer:
         self._size = 0
 
     def add(self, name: str, array: npt.NDArray[Any], *, delta: bool = False, **facts: Any) -> None:
-        """array: uint8, uint16, uint32 or float32, one row a frame if `delta`. facts: code and what it needs."""
+        """array: uint8, uint16, uint32 or float32; of rows (of frames, mostly) or single numbers. facts: code and what it needs."""
         if delta:
             array = np.diff(array, axis=0, prepend=np.zeros_like(array[:1]))
         array = np.ascontiguousarray(array)
@@ -98,7 +98,8 @@ class Packer:
         # All first bytes, then all second ones: high bytes are often alike.
         content = flat.view(np.uint8).reshape(-1, width).T.tobytes() if len(flat) else b""
         self.sections[name] = {
-            "type": kind.name, "offset": self._size, "count": len(flat), "row": len(flat) // max(len(array), 1), "delta": delta, **facts,
+            "type": kind.name, "offset": self._size, "count": len(flat), "row": len(flat) // max(len(array), 1), "rows": array.ndim > 1,
+            "delta": delta, **facts,
         }  # fmt: skip
         self._parts.append(content)
         self._size += len(content)
@@ -108,7 +109,7 @@ class Packer:
 
 
 def unpack(text: str, sections: dict[str, dict[str, Any]]) -> dict[str, npt.NDArray[Any]]:
-    """What the page's script does: sections by name, their quanta as (rows, row), or (count,) where a row is one number."""
+    """What the page's script does: sections by name, their quanta in the shape that they had, rows of rows flattened."""
     blob = zlib.decompress(base64.b64decode(text))
     found: dict[str, npt.NDArray[Any]] = {}
     for name, section in sections.items():
@@ -116,6 +117,6 @@ def unpack(text: str, sections: dict[str, dict[str, Any]]) -> dict[str, npt.NDAr
         size = section["count"] * kind.itemsize
         content = np.frombuffer(blob, np.uint8, size, section["offset"]).reshape(kind.itemsize, -1).T
         flat = np.ascontiguousarray(content).view(kind).ravel().astype(kind.newbyteorder("="))
-        rows = flat.reshape(-1, section["row"]) if section["row"] > 1 else flat
+        rows = flat.reshape(-1, max(section["row"], 1)) if section["rows"] else flat
         found[name] = np.cumsum(rows, axis=0, dtype=rows.dtype) if section["delta"] else rows
     return found

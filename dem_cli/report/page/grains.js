@@ -18,8 +18,7 @@ class GrainPainter {
     this.own = false; // whether the user has moved the view
     this.fits = new Map();
     this.starts = startsOf(this.data.whole("contacts"));
-    this.footStarts = null;
-    this.mayDrag = "moves";
+    this.mayDrag = "moves the view";
   }
 
   // x0, x1, y0, y1 of what is to be seen in some frames: grains, and walls with ends.

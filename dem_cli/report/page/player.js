@@ -154,9 +154,15 @@ class Player {
       p: () => this.select((Math.max(this.selected, 0) - 1 + this.ids.length) % this.ids.length),
       Escape: () => this.select(-1),
     };
-    if (!(event.key in acts)) return;
+    const moves = { ArrowLeft: [-40, 0], ArrowRight: [40, 0], ArrowUp: [0, -40], ArrowDown: [0, 40] };
+    const move = event.shiftKey && moves[event.key];
+    if (!move && !(event.key in acts)) return;
     event.preventDefault();
-    acts[event.key]();
+    if (!move) acts[event.key]();
+    else {
+      this.painter.drag(...move, false);
+      this.redraw();
+    }
   }
 
   select(k) {
@@ -277,8 +283,7 @@ class Player {
     }
     if (name === "kind") return data.whole("group");
     if (name === "height") return data.row("z", frame);
-    const section = data.sections[name];
-    return section.row > 1 || section.count === this.facts.places.length * this.facts.count ? data.row(name, frame) : data.whole(name);
+    return data.sections[name].rows ? data.row(name, frame) : data.whole(name);
   }
 
   limitsOf(quantity, frame) {
