@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BUDGET = 11_000_000  # characters of all players of a page: with pictures and tables it stays below 15 MB
-LEAST_BUDGET = 200_000  # of each of many files
+LEAST_BUDGET = 100_000  # of each of many files
 
 # Attribute of a file -> what a reader calls it.
 PROVENANCE = {

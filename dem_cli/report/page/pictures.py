@@ -49,7 +49,7 @@ OVER_INCREMENTS = (
     "ranked",
 )  # fmt: skip
 OF_BODIES = ("scene", "series", "energy", "check", "runout", "histories", "trajectories")
-FEW = ("sample", "scene", "series", "stress-strain")  # of each of several files
+FEW = ("series", "stress-strain")  # of each of several files, whose samples the players show
 
 
 def drawing(figure: Figure, title: str, caption: str, alt: str, *, grains: int = 0) -> Drawing:
