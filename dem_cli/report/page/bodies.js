@@ -71,15 +71,24 @@ class BodyPainter {
         box[2] = Math.min(box[2], v - r);
         box[3] = Math.max(box[3], v + r);
       };
+      let top = -Infinity;
       for (const f of this.player.scaleFrames(frame, 24)) {
         const [x, y, z, shown] = ["x", "y", "z", "shown"].map((name) => this.data.row(name, f));
         for (let k = 0; k < x.length; k++) {
-          if (shown[k]) hold(x[k], y[k], z[k], this.reach[this.shape[k]] * this.scale[k]);
+          if (!shown[k]) continue;
+          const reach = this.reach[this.shape[k]] * this.scale[k];
+          hold(x[k], y[k], z[k], reach);
+          top = Math.max(top, z[k] + reach);
         }
       }
+      const normals = this.data.whole("planeNormals");
       for (let w = 0; w < this.facts.planes; w++) {
         const p = this.data.whole(`plane${w}`);
-        for (let m = 0; m < p.length; m += 3) hold(p[m], p[m + 1], p[m + 2], 0);
+        // Of upright walls only what is beside the bodies, and a little more.
+        const low = p.reduce((least, v, m) => (m % 3 === 2 ? Math.min(least, v) : least), Infinity);
+        const upright = Math.abs(normals[3 * w + 2]) < 0.1 && top > low;
+        const ceiling = upright ? top + 0.15 * (top - low) : Infinity;
+        for (let m = 0; m < p.length; m += 3) hold(p[m], p[m + 1], Math.min(p[m + 2], ceiling), 0);
       }
       if (this.data.has("terrain")) {
         const t = this.data.whole("terrain");

@@ -1,6 +1,5 @@
-// One player: its frames, controls and tables. What a frame looks like is the painter's.
+// One player: its frames, scales, colours and tables. What a frame looks like is the painter's, what the reader does the controls'.
 
-const RATES = [1, 2, 5, 10, 20, 40]; // frames a second
 const MOST_VALUES = 200000; // of a quantity that its limits are taken from
 
 class Player {
@@ -32,137 +31,16 @@ class Player {
     this.ids = Array.from(this.data.whole("id"));
     this.painter = this.facts.kind === "bodies" ? new BodyPainter(this) : new GrainPainter(this);
     this.count = this.facts.places.length;
-    this.fill();
+    fillControls(this);
     const [x0, x1, y0, y1] = this.painter.bounds(this.count - 1);
     this.aspect = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.3), 0.8);
-    this.listen();
+    listen(this);
+    listenToPointer(this);
     this.part("status").hidden = true;
     this.root.dataset.ready = "yes";
     new ResizeObserver(() => this.resize()).observe(this.canvas.parentElement);
     this.resize();
     this.show(this.count - 1);
-  }
-
-  // ---------------------------------------------------------------- controls
-
-  fill() {
-    const { facts } = this;
-    const option = (select, value, text) => select.add(new Option(text, value));
-    const gaps = facts.places.slice(1).map((place, k) => place - facts.places[k]);
-    const gap = percentile(gaps.filter((v) => v > 0).sort((a, b) => a - b), 0.5);
-    for (const rate of RATES) {
-      const real = facts.axis === "time" && gap > 0 ? `, ${formatNumber(rate * gap, 2)} x real time` : "";
-      option(this.part("speed"), rate, `${rate} frame${rate > 1 ? "s" : ""}/s${real}`);
-    }
-    this.part("speed").value = "10";
-    for (const quantity of facts.quantities) option(this.part("color"), quantity.name, quantity.label);
-    this.part("color").value = facts.color;
-    this.part("scrub").max = String(this.count - 1);
-    this.part("chains").checked = true;
-    const bodies = facts.kind === "bodies";
-    if (bodies) this.part("chains").checked = false;
-    this.root.querySelector('[data-only="grains"]').hidden = bodies;
-    this.root.querySelector('[data-only="bonds"]').hidden = !facts.several;
-    this.noun = bodies ? "body" : facts.several ? "disc" : "grain";
-    this.part("noun").textContent = this.noun[0].toUpperCase() + this.noun.slice(1);
-    this.part("dragging").textContent = this.painter.mayDrag;
-    this.part("grain").max = String(this.ids.reduce((most, id) => Math.max(most, id), 0));
-  }
-
-  listen() {
-    const on = (name, type, act) => this.part(name).addEventListener(type, act);
-    on("play", "click", () => this.toggle());
-    on("first", "click", () => this.show(0));
-    on("last", "click", () => this.show(this.count - 1));
-    on("back", "click", () => this.step(-1));
-    on("next", "click", () => this.step(1));
-    on("scrub", "input", (event) => this.show(Number(event.target.value)));
-    for (const name of ["color", "chains", "marks", "bonds"]) on(name, "change", () => this.redraw());
-    on("scale", "change", () => {
-      this.painter.own = false;
-      this.redraw();
-    });
-    on("grain", "input", (event) => {
-      this.selected = event.target.value === "" ? -1 : this.ids.indexOf(Number(event.target.value));
-      this.redraw();
-    });
-    const middle = () => [this.width / 2, this.height / 2];
-    on("in", "click", () => this.zoom(1.4, ...middle()));
-    on("out", "click", () => this.zoom(1 / 1.4, ...middle()));
-    on("fit", "click", () => this.fit());
-    this.canvas.addEventListener("keydown", (event) => this.key(event));
-    this.listenToPointer();
-  }
-
-  listenToPointer() {
-    const { canvas } = this;
-    let held = null;
-    const at = (event) => {
-      const box = canvas.getBoundingClientRect();
-      return [event.clientX - box.left, event.clientY - box.top];
-    };
-    canvas.addEventListener("pointerdown", (event) => {
-      held = { x: event.clientX, y: event.clientY, moved: false };
-      canvas.setPointerCapture(event.pointerId);
-    });
-    canvas.addEventListener("pointermove", (event) => {
-      if (held) {
-        const [dx, dy] = [event.clientX - held.x, event.clientY - held.y];
-        if (!held.moved && Math.hypot(dx, dy) < 4) return;
-        held = { x: event.clientX, y: event.clientY, moved: true };
-        this.painter.drag(dx, dy, event.shiftKey);
-      } else {
-        this.hovered = this.painter.pick(...at(event), this.frame);
-      }
-      this.redraw();
-    });
-    canvas.addEventListener("pointerup", (event) => {
-      if (held && !held.moved) this.select(this.painter.pick(...at(event), this.frame));
-      held = null;
-    });
-    canvas.addEventListener("pointercancel", () => (held = null));
-    canvas.addEventListener("pointerleave", () => {
-      this.hovered = -1;
-      this.redraw();
-    });
-    // Only where the reader has chosen the picture: the wheel belongs to the page else.
-    canvas.addEventListener(
-      "wheel",
-      (event) => {
-        if (document.activeElement !== canvas && !event.ctrlKey) return;
-        event.preventDefault();
-        this.zoom(Math.exp(-Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 100) * 0.002), ...at(event));
-      },
-      { passive: false },
-    );
-  }
-
-  key(event) {
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    const middle = [this.width / 2, this.height / 2];
-    const acts = {
-      " ": () => this.toggle(),
-      ArrowLeft: () => this.step(-1),
-      ArrowRight: () => this.step(1),
-      Home: () => this.show(0),
-      End: () => this.show(this.count - 1),
-      "+": () => this.zoom(1.4, ...middle),
-      "=": () => this.zoom(1.4, ...middle),
-      "-": () => this.zoom(1 / 1.4, ...middle),
-      0: () => this.fit(),
-      n: () => this.select((this.selected + 1) % this.ids.length),
-      p: () => this.select((Math.max(this.selected, 0) - 1 + this.ids.length) % this.ids.length),
-      Escape: () => this.select(-1),
-    };
-    const moves = { ArrowLeft: [-40, 0], ArrowRight: [40, 0], ArrowUp: [0, -40], ArrowDown: [0, 40] };
-    const move = event.shiftKey && moves[event.key];
-    if (!move && !(event.key in acts)) return;
-    event.preventDefault();
-    if (!move) acts[event.key]();
-    else {
-      this.painter.drag(...move, false);
-      this.redraw();
-    }
   }
 
   select(k) {

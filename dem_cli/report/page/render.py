@@ -14,7 +14,7 @@ from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.page.model import Page
 
 ENDINGS = (".html", ".htm")
-SCRIPTS = ("codec.js", "colors.js", "grains.js", "bodies.js", "player.js", "page.js")
+SCRIPTS = ("codec.js", "colors.js", "contacts.js", "grains.js", "bodies.js", "controls.js", "player.js", "page.js")
 
 
 def check_page(path: Path, force: bool) -> None:
