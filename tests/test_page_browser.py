@@ -19,7 +19,7 @@ import scene_samples as solid
 from PIL import Image
 from shape_samples import shaped
 
-from dem_cli.report.page.build import _player
+from dem_cli.report.page.build import player_of
 from dem_cli.report.page.model import Note, Page, Section
 from dem_cli.report.page.render import write_page
 from dem_cli.report.quantities import QUANTITIES
@@ -86,7 +86,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shear.write_test(folder / "increments.h5", increments=10)
     for path in folder.glob("*.h5"):
         with open_results(path) as results:
-            parts = (Note("before"), *_player(results, 10_000_000))
+            parts = (Note("before"), *player_of(results, 10_000_000))
             write_page(
                 Page("Test", "of <the> page", ("a banner",), ("a warning",), (Section("Grains", parts),)),
                 path.with_suffix(".html"),

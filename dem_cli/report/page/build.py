@@ -60,7 +60,7 @@ def _one(results: Results) -> Page:
     head, *rest = tables
     sections = [
         Section("Summary", (Block("", head.header, head.rows, head.left),)),
-        Section("Grains in motion" if results.kind != "bodies" else "Bodies in motion", _player(results, BUDGET)),
+        Section("Grains in motion" if results.kind != "bodies" else "Bodies in motion", player_of(results, BUDGET)),
         Section("Numbers", tuple(rest)),
         Section("Figures", _pictures(results)),
         Section("Scenario and provenance", _sources(results)),
@@ -75,7 +75,7 @@ def _one(results: Results) -> Page:
 
 
 def _tables(results: Results) -> tuple[list[Block], tuple[str, ...]]:
-    """The text report's tables, and its warnings."""
+    """The text report's tables, and its other warnings."""
     if isinstance(results, BodyResults):
         body = impulse.body_summary(results)
         found, warnings = impulse_text.blocks(body), body.warnings
@@ -85,7 +85,9 @@ def _tables(results: Results) -> tuple[list[Block], tuple[str, ...]]:
     else:
         run = over_time.summary(results)
         found, warnings = text.blocks(run), run.warnings
-    return [block for block in found if block.title != "Warnings"], tuple(warnings)
+    # That it is incomplete stands at the top of the page.
+    said = tuple(line for line in warnings if not line.startswith("the run is incomplete"))
+    return [block for block in found if block.title != "Warnings"], said
 
 
 def _banners(results: Results) -> list[str]:
@@ -94,7 +96,7 @@ def _banners(results: Results) -> list[str]:
     return [f"Incomplete run: {results.stop_reason}. Numbers and pictures show what was written, up to its last row."]
 
 
-def _player(results: Results, budget: int) -> tuple[Part, ...]:
+def player_of(results: Results, budget: int) -> tuple[Part, ...]:
     title = results.title or results.path.name
     found = (
         body_player(results, budget, title)
@@ -137,7 +139,7 @@ def _several(opened: Sequence[Results]) -> Page:
         tables, said = _tables(results)
         warnings += [f"{results.path.name}: {line}" for line in said]
         parts = (
-            *_player(results, budget),
+            *player_of(results, budget),
             *tables[:1],
             *_pictures(results, few=True),
             *_folded(tables[1:]),

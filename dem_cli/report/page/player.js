@@ -40,6 +40,9 @@ class Player {
     this.root.dataset.ready = "yes";
     new ResizeObserver(() => this.resize()).observe(this.canvas.parentElement);
     this.resize();
+    // Where grains are too small to be told from the lines through them, the reader may still ask for the lines.
+    this.painter.fit(this.count - 1);
+    if (this.facts.kind === "grains" && this.painter.mean * this.painter.view.scale < 2.5) this.part("chains").checked = false;
     this.show(this.count - 1);
   }
 
