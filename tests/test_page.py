@@ -16,16 +16,17 @@ import pytest
 import quasi_static_samples as shear
 import report_samples as made
 import scene_samples as solid
+import sweep_samples as swept
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from shape_samples import shaped
 
 from dem_cli.cli.report import command
 from dem_cli.errors import DemError
-from dem_cli.report import text
+from dem_cli.report import sweep_figures, sweep_text, text
 from dem_cli.report.look import new_figure, style
 from dem_cli.report.page import codes, frames
-from dem_cli.report.page.build import comparison, file_page, sweep_page
+from dem_cli.report.page.build import comparison, file_page
 from dem_cli.report.page.frames import spread
 from dem_cli.report.page.grains import grain_player
 from dem_cli.report.page.model import Drawing, Page, Player, Section
@@ -34,8 +35,8 @@ from dem_cli.report.page.render import html
 from dem_cli.report.page.rigid import body_player
 from dem_cli.report.quantities import QUANTITIES
 from dem_cli.report.summary import summary
+from dem_cli.report.sweep import read_sweep
 from dem_cli.results import BodyResults, Results, open_results
-from dem_cli.results.manifest import Manifest, Member, SweepAxis, write_manifest
 
 HOSTILE = """</script><script>alert(1)</script><b>"bold" & 'bad'</b>"""
 PLENTY = 10_000_000
@@ -411,29 +412,35 @@ def test_several_files(tmp_path: Path, path: Path) -> None:
 
 
 def test_sweep(tmp_path: Path) -> None:
-    """Every member with its settings and state; those that are done are compared; others may bring tables and pictures."""
-    made.make_file(tmp_path / "a.h5", interval=0.05)
-    settings = [{"stage.shake.amplitude": f"{gal} gal"} for gal in (400, 800)]
-    manifest = Manifest(
-        title="Amplitudes <1>",
-        scenario="mine.toml",
-        axes=(SweepAxis(("stage.shake.amplitude",), (("400 gal",), ("800 gal",))),),
-        members=(
-            Member("amplitude=400", "a.h5", "1", settings[0], "done", "", 12.0),
-            Member("amplitude=800", "b.h5", "2", settings[1], "failed", "grain 7 flew away"),
-        ),
-        folder=tmp_path,
-    )
-    more = text.Block("Of others", ("a",), (("42.5",),))
-    read = Read(html(sweep_page(manifest, tables=[more])))
-    assert {"amplitude=800", "800 gal", "failed", "grain 7 flew away", "12 s", "42.5"} <= set(read.cells)
-    assert "Incomplete sweep: of 2 members 1 failed." in read.texts
-    assert "0.214 → 0.199" in read.cells
-    write_manifest(manifest)
-    result = CliRunner().invoke(command, [str(tmp_path), "--html", str(tmp_path / "sweep.html")])
+    """All tables and pictures of its report, every member with its state and reason, and those that are done compared."""
+    axes = {
+        swept.SHAPE: ("disc", "ellipse"),
+        swept.GAL: ("400 gal", "800 gal"),
+        swept.HERTZ: ("1 Hz", "2 Hz"),
+        swept.SEED: (1, 2),
+    }
+    folder = swept.make_sweep(tmp_path / "grid", axes, failed=["disc-400-1-2"], waiting=["ellipse-800-2-2"])
+    target = tmp_path / "sweep.html"
+    result = CliRunner().invoke(command, [str(folder), "--html", str(target)])
     assert result.exit_code == 0, result.output
-    assert "grain 7 flew away" in result.stdout
-    assert "Amplitudes &lt;1&gt;" in (tmp_path / "sweep.html").read_text()
+    assert result.stderr == f"wrote {target}\n"
+    assert "Best point" in result.stdout
+    read = Read(target.read_text(encoding="utf-8"))
+    cells = {cell.replace("→", "->").replace("±", "+-") for cell in read.cells}
+    found = read_sweep(folder)
+    for block in [
+        *sweep_text.blocks(found),
+        *comparison([folder / one.file for one in found.entries if one.numbers])[0],
+    ]:
+        if block.title != "Warnings":
+            for row in block.rows:
+                assert set(row) - {""} <= cells, row
+    assert {"disc-400-1-2", "failed", "waiting", "grain 17 left the container at 1.2 s; take a smaller dt"} <= cells
+    assert "Incomplete sweep: of 16 members 1 waiting and 1 failed." in read.texts
+    with style():
+        shown = [f"{title}: {caption}" for title, caption, _ in sweep_figures.sections(found)]
+    assert len(shown) >= 2
+    assert set(shown) <= {attrs["alt"] for attrs in read.attributes("img")}
 
 
 # ------------------------------------------------------------------------------------------------ the command

@@ -11,7 +11,7 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals"
 
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
-@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE|SWEEP")
 @click.option(
     "-o",
     "output",
@@ -86,7 +86,7 @@ def command(
     dpi: float | None,
     force: bool,
 ) -> None:
-    """Draw a picture from a result FILE and print its name.
+    """Draw a picture from a result FILE, or of a SWEEP, and print its name.
 
     \b
     sample        grains to scale, coloured by a quantity, with force chains
@@ -118,6 +118,13 @@ def command(
     check           velocity over time beside the closed form that [output] check names
     runout          how far bodies ran from where they started
 
+    \b
+    Of a SWEEP, its folder or sweep.toml:
+    map             change of the void ratio, or --color MEASURE (named as in dem report --json), over two axes;
+                    over one axis curves (the default)
+    resonance       the surface's motion over the driving period by T1
+    shapes          shapes or scenarios side by side, before and after
+
     Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
     normals show one frame with --increment, --frame or --last.
 
@@ -130,6 +137,7 @@ def command(
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.
+    from dem_cli.cli import of_sweep
     from dem_cli.errors import ScenarioError
     from dem_cli.report import animation
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
@@ -137,6 +145,10 @@ def command(
     from dem_cli.report.look import check_target, save, style
     from dem_cli.results import BodyResults, open_results
 
+    if of_sweep.asked_for([file]):
+        options = {name for name, value in click.get_current_context().params.items() if value not in (None, False)}
+        of_sweep.render(file, output, what, color, options, dpi, force)
+        return
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")
     three = kind_of([file]) == "bodies" if file.is_file() else False

@@ -8,7 +8,7 @@ import click
 
 
 @click.command(name="report", short_help="Print what a result file says; compare several.")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE|SWEEP...")
 @click.option("--json", "as_json", is_flag=True, help="The same numbers for machines: SI units, null where undefined.")
 @click.option(
     "--csv",
@@ -17,6 +17,7 @@ import click
     metavar="DIR",
     help="Also write the tables as CSV into DIR.",
 )
+@click.option("--each", is_flag=True, help="Of a sweep: a row for each run too, not only for each point.")
 @click.option(
     "--html",
     "page",
@@ -25,7 +26,9 @@ import click
     help="Also write a page to look at: tables, figures, and the grains in motion.",
 )
 @click.option("--force", is_flag=True, help="Overwrite CSV tables and a page that exist.")
-def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, page: Path | None, force: bool) -> None:
+def command(
+    files: tuple[Path, ...], as_json: bool, folder: Path | None, each: bool, page: Path | None, force: bool
+) -> None:
     """Print what result FILEs say.
 
     One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
@@ -35,24 +38,30 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, page: P
     get a row of their mean. --json prints an object for one FILE and a list for several; its keys are those of
     the dataclasses in dem_cli/report/summary.py, of shear tests shear.py, of bodies impulse.py. --csv writes
     series.csv, stages.csv, surface.csv (shear tests: dissipation.csv; bodies: check.csv, runout.csv) and
-    tracks.csv; with several FILEs into one folder a file below DIR. --html writes PAGE, of FILEs or of the
-    folder of a sweep: one file for a browser that fetches nothing, with the tables, figures, scenario and
-    provenance, and a player of the frames.
+    tracks.csv; with several FILEs into one folder a file below DIR.
+
+    SWEEP, the folder of a sweep or its sweep.toml: a row a point with seeds pooled (mean and its 95 % confidence
+    interval), the best point, failed members with their reasons. --csv writes cases.csv and members.csv.
+
+    --html writes PAGE, of FILEs or of a SWEEP: one file for a browser that fetches nothing, with the tables,
+    figures, scenario and provenance, and a player of the frames of each FILE.
     """
     # Imported here so that `dem --help` stays quick.
     import json
     import sys
 
+    from dem_cli.cli import of_sweep
     from dem_cli.report import export, impulse, impulse_csv, impulse_text, shear, shear_text, summary, text
     from dem_cli.report.kinds import kind_of
     from dem_cli.results import BodyResults, open_results
-    from dem_cli.results.manifest import is_sweep
 
     if page is not None:
         _check_page(page, force)
-        if len(files) == 1 and is_sweep(files[0]):
-            _sweep(files[0], page)
-            return
+    if of_sweep.asked_for(files, each):
+        of_sweep.report(files[0], as_json, folder, each, force)
+        if page is not None:
+            _write_page(files, page)
+        return
     kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
     runs, tests, bodies = [], [], []
@@ -99,23 +108,10 @@ def _check_page(page: Path, force: bool) -> None:
 
 
 def _write_page(files: tuple[Path, ...], page: Path) -> None:
-    from dem_cli.report.page.build import file_page
+    from dem_cli.cli import of_sweep
+    from dem_cli.report.page.build import file_page, sweep_page
     from dem_cli.report.page.render import write_page
+    from dem_cli.report.sweep import read_sweep
 
-    write_page(file_page(files), page)
-    click.echo(f"wrote {page}", err=True)
-
-
-def _sweep(folder: Path, page: Path) -> None:
-    """The page of a sweep; its members on stdout."""
-    import sys
-
-    from dem_cli.report import text
-    from dem_cli.report.page.build import axes_of, members, sweep_page
-    from dem_cli.report.page.render import write_page
-    from dem_cli.results.manifest import read_manifest
-
-    manifest = read_manifest(folder)
-    text.show([*axes_of(manifest), members(manifest)], sys.stdout)
-    write_page(sweep_page(manifest), page)
+    write_page(sweep_page(read_sweep(files[0])) if of_sweep.asked_for(files) else file_page(files), page)
     click.echo(f"wrote {page}", err=True)

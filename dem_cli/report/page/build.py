@@ -18,6 +18,7 @@ from dem_cli.report import (
     shear,
     shear_curves,
     shear_text,
+    sweep_text,
     text,
 )
 from dem_cli.report import summary as over_time
@@ -27,9 +28,10 @@ from dem_cli.report.page.grains import grain_player
 from dem_cli.report.page.model import Drawing, Listing, Note, Page, Part, Section
 from dem_cli.report.page.pictures import drawing, pictures
 from dem_cli.report.page.rigid import body_player
+from dem_cli.report.sweep import Entry, Sweep
+from dem_cli.report.sweep_figures import sections as pictures_of
 from dem_cli.report.text import NOTHING, Block, with_unit
 from dem_cli.results import BodyResults, Results, open_results
-from dem_cli.results.manifest import Manifest, Member
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -208,47 +210,44 @@ def _tried(draw: Callable[[], Figure], title: str, caption: str) -> list[Drawing
 # ------------------------------------------------------------------------------------------------ a sweep
 
 
-def sweep_page(manifest: Manifest, *, tables: Sequence[Block] = (), drawings: Sequence[Drawing] = ()) -> Page:
-    """The page of a sweep: its members and what became of them, then those that are done compared.
-
-    tables, drawings: of whoever knows the sweep's axes; they stand before the comparison.
-    """
-    states = [member.state for member in manifest.members]
-    done = [manifest.path(m) for m in manifest.members if m.state == "done" and manifest.path(m).is_file()]
-    sections = [Section("Members", (*axes_of(manifest), members(manifest)))]
-    if tables or drawings:
-        sections.append(Section("Over the axes", (*tables, *drawings)))
-    warnings: list[str] = []
-    if done:
-        blocks, pictures_, warnings = comparison(done)
-        sections.append(Section("Comparison", (*blocks, *pictures_)))
-    missing = [f"{states.count(state)} {state}" for state in ("waiting", "failed") if state in states]
-    count = len(manifest.members)
+def sweep_page(found: Sweep) -> Page:
+    """The page of a sweep: its tables and pictures, what became of each member, then those that are done compared."""
+    head, *tables = [block for block in sweep_text.blocks(found) if block.title != "Warnings"]
+    with style():
+        drawings = [
+            drawing(figure, title, caption, f"{title}: {caption}") for title, caption, figure in pictures_of(found)
+        ]
+    sections = [
+        Section("Summary", (Block("", head.header, head.rows, head.left),)),
+        Section("Figures", tuple(drawings)),
+        Section("Tables", tuple(tables)),
+        Section("Members", (members(found),)),
+    ]
+    warnings = list(found.said)
+    done = [found.folder / one.file for one in found.entries if one.state == "done"]
+    if len(found.kinds) == 1:
+        blocks, more, said = comparison(done)
+        sections.append(Section("Runs compared", (*blocks, *more)))
+        warnings += said
+    count = len(found.entries)
+    missing = [f"{found.counts[state]} {state}" for state in ("waiting", "failed") if found.counts[state]]
     return Page(
-        title=manifest.title or manifest.folder.name,
-        subtitle=f"Sweep of {manifest.scenario}: {count} members, {states.count('done')} done",
+        title=found.title or found.folder.name,
+        subtitle=f"Sweep of {found.scenario}: {count} members, {found.counts['done']} done",
         banners=(f"Incomplete sweep: of {count} members {' and '.join(missing)}.",) if missing else (),
         warnings=tuple(dict.fromkeys(warnings)),
-        sections=tuple(sections),
+        sections=tuple(section for section in sections if section.parts),
     )
 
 
-def axes_of(manifest: Manifest) -> list[Block]:
-    """What varies; nothing where nothing does."""
-    rows = tuple(
-        (", ".join(axis.keys), axis.kind, "; ".join(", ".join(str(value) for value in point) for point in axis.points))
-        for axis in manifest.axes
-    )
-    return [Block("Axes", ("setting", "kind", "values"), rows, left=3)] if rows else []
-
-
-def members(manifest: Manifest) -> Block:
+def members(found: Sweep) -> Block:
     """A row a member: its settings, what became of it, and why."""
-    keys = list(dict.fromkeys(key for member in manifest.members for key in member.settings))
+    keys = list(dict.fromkeys(key for one in found.entries for key in one.settings))
 
-    def row(member: Member) -> tuple[str, ...]:
-        values = (str(member.settings.get(key, NOTHING)) for key in keys)
-        return (member.name, *values, member.state, with_unit(member.seconds, "s", ".3g"), member.reason)
+    def row(one: Entry) -> tuple[str, ...]:
+        values = (str(one.settings.get(key, NOTHING)) for key in keys)
+        seed = NOTHING if one.seed is None else str(one.seed)
+        return (one.name, *values, seed, one.state, with_unit(one.seconds, "s", ".3g"), one.reason)
 
-    header = ("member", *keys, "state", "computed in", "reason")
-    return Block("Members", header, tuple(row(member) for member in manifest.members), left=len(header))
+    header = ("member", *keys, "seed", "state", "computed in", "reason")
+    return Block("", header, tuple(row(one) for one in found.entries), left=len(header))
