@@ -211,6 +211,15 @@ def test_incomplete_run_is_told_at_the_top(tmp_path: Path) -> None:
     assert not any("the run is incomplete" in text for text in read.texts)
 
 
+def test_many_warnings_are_folded_away() -> None:
+    lines = tuple(f"warning {k}" for k in range(11))
+    read = Read(html(Page("t", warnings=lines)))
+    assert [text for text in read.texts if text in lines] == list(lines)
+    assert "3 more" in read.texts
+    assert "0 more" not in Read(html(Page("t", warnings=lines[:8]))).texts
+    assert not Read(html(Page("t", warnings=lines[:8]))).attributes("details")
+
+
 def test_file_without_frames(tmp_path: Path) -> None:
     """A run that was killed at its start has a page, too."""
     path = made.make_file(tmp_path / "none.h5", stop_after=-1.0)
@@ -405,6 +414,7 @@ def test_several_files(tmp_path: Path, path: Path) -> None:
     page = file_page([path, other])
     read = Read(html(page))
     assert [section.title for section in page.sections] == ["Comparison", "1. run.h5", "2. other.h5"]
+    assert [line.endswith("the fourth grain is shy") for line in page.warnings].count(True) == 2  # once a file
     assert len(read.attributes("canvas")) == 2
     for block in comparison([path, other])[0]:
         for row in block.rows:

@@ -139,7 +139,8 @@ def _several(opened: Sequence[Results]) -> Page:
     sections = [Section("Comparison", (*blocks, *drawings))]
     for number, results in enumerate(opened, start=1):
         tables, said = _tables(results)
-        warnings += [f"{results.path.name}: {line}" for line in said]
+        # A comparison has the warnings of its runs already.
+        warnings += [f"{results.path.name}: {line}" for line in said if not any(line in other for other in warnings)]
         parts = (
             *player_of(results, budget),
             *tables[:1],
@@ -223,19 +224,17 @@ def sweep_page(found: Sweep) -> Page:
         Section("Tables", tuple(tables)),
         Section("Members", (members(found),)),
     ]
-    warnings = list(found.said)
     done = [found.folder / one.file for one in found.entries if one.state == "done"]
     if len(found.kinds) == 1:
-        blocks, more, said = comparison(done)
+        blocks, more, _ = comparison(done)
         sections.append(Section("Runs compared", (*blocks, *more)))
-        warnings += said
     count = len(found.entries)
     missing = [f"{found.counts[state]} {state}" for state in ("waiting", "failed") if found.counts[state]]
     return Page(
         title=found.title or found.folder.name,
         subtitle=f"Sweep of {found.scenario}: {count} members, {found.counts['done']} done",
         banners=(f"Incomplete sweep: of {count} members {' and '.join(missing)}.",) if missing else (),
-        warnings=tuple(dict.fromkeys(warnings)),
+        warnings=tuple(found.said),
         sections=tuple(section for section in sections if section.parts),
     )
 

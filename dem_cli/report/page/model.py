@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 from dem_cli.report.text import Block
 
+MOST_WARNINGS = 8  # that are shown at once
+
 
 @dataclass(frozen=True)
 class Drawing:
@@ -31,7 +33,7 @@ class Drawing:
     @property
     def wide(self) -> bool:
         """Too wide to be read in half of the page."""
-        return self.size[0] > max(9.0, 1.7 * self.size[1])
+        return self.size[0] > max(7.5, 1.7 * self.size[1])
 
     @property
     def address(self) -> str:
@@ -90,3 +92,7 @@ class Page:
     banners: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     sections: tuple[Section, ...] = field(default=())
+
+    def told(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Warnings that are shown at once, and those that are folded away."""
+        return self.warnings[:MOST_WARNINGS], self.warnings[MOST_WARNINGS:]
