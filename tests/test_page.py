@@ -25,17 +25,19 @@ from dem_cli.cli.report import command
 from dem_cli.errors import DemError
 from dem_cli.report import sweep_figures, sweep_text, text
 from dem_cli.report.look import new_figure, style
-from dem_cli.report.page import codes, frames
-from dem_cli.report.page.build import comparison, file_page
+from dem_cli.report.page import build, codes, frames
+from dem_cli.report.page.build import BUDGET, comparison, file_page, player_of, sweep_page
 from dem_cli.report.page.frames import spread
 from dem_cli.report.page.grains import grain_player
-from dem_cli.report.page.model import Drawing, Page, Player, Section
+from dem_cli.report.page.model import Drawing, Listing, Page, Player, Section
 from dem_cli.report.page.pictures import drawing
 from dem_cli.report.page.render import html
 from dem_cli.report.page.rigid import body_player
 from dem_cli.report.quantities import QUANTITIES
 from dem_cli.report.summary import summary
 from dem_cli.report.sweep import read_sweep
+from dem_cli.report.sweep_best import best_point
+from dem_cli.report.text import Block
 from dem_cli.results import BodyResults, Results, open_results
 
 HOSTILE = """</script><script>alert(1)</script><b>"bold" & 'bad'</b>"""
@@ -451,6 +453,38 @@ def test_sweep(tmp_path: Path) -> None:
         shown = [f"{title}: {caption}" for title, caption, _ in sweep_figures.sections(found)]
     assert len(shown) >= 2
     assert set(shown) <= {attrs["alt"] for attrs in read.attributes("img")}
+
+
+def test_sweep_shows_a_run_of_its_best_point_and_where_it_comes_from(tmp_path: Path) -> None:
+    axes = {
+        swept.SHAPE: ("disc",),
+        swept.GAL: ("400 gal", "800 gal"),
+        swept.HERTZ: ("1 Hz", "2 Hz"),
+        swept.SEED: (1, 2),
+    }
+    folder = swept.make_sweep(tmp_path / "grid", axes)
+    found = read_sweep(folder)
+    best = best_point(found)
+    assert best is not None
+    first = found.cases[best.case].entries[0]
+    page = sweep_page(found)
+    (motion,) = [section for section in page.sections if section.title.startswith("In motion")]
+    assert motion.title == f"In motion: {first.name}, of the best point"
+    with open_results(folder / first.file) as results:
+        assert motion.parts == player_of(results, BUDGET)
+        (sources,) = [section for section in page.sections if section.title == "Scenario and provenance"]
+        rows = [row for part in sources.parts if isinstance(part, Block) for row in part.rows]
+        assert ("scenario hash", results.attrs["scenario_hash"]) in rows
+    listings = [part.text for part in sources.parts if isinstance(part, Listing)]
+    assert listings[-1] == (folder / "sweep.toml").read_text(encoding="utf-8")
+
+
+def test_large_sweeps_are_not_compared_run_by_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    axes = {swept.SHAPE: ("disc",), swept.GAL: ("400 gal", "800 gal"), swept.HERTZ: ("1 Hz",), swept.SEED: (1, 2)}
+    found = read_sweep(swept.make_sweep(tmp_path / "grid", axes))
+    assert "Runs compared" in [section.title for section in sweep_page(found).sections]
+    monkeypatch.setattr(build, "MOST_COMPARED", 3)
+    assert "Runs compared" not in [section.title for section in sweep_page(found).sections]
 
 
 # ------------------------------------------------------------------------------------------------ the command

@@ -29,15 +29,18 @@ from dem_cli.report.page.model import Drawing, Listing, Note, Page, Part, Sectio
 from dem_cli.report.page.pictures import drawing, pictures
 from dem_cli.report.page.rigid import body_player
 from dem_cli.report.sweep import Entry, Sweep
+from dem_cli.report.sweep_best import best_point
 from dem_cli.report.sweep_figures import sections as pictures_of
 from dem_cli.report.text import NOTHING, Block, with_unit
 from dem_cli.results import BodyResults, Results, open_results
+from dem_cli.results.manifest import NAME
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BUDGET = 11_000_000  # characters of all players of a page: with pictures and tables it stays below 15 MB
 LEAST_BUDGET = 100_000  # of each of many files
+MOST_COMPARED = 60  # members of a sweep that are compared run by run; the tables of the sweep hold them all
 
 # Attribute of a file -> what a reader calls it.
 PROVENANCE = {
@@ -212,7 +215,24 @@ def _tried(draw: Callable[[], Figure], title: str, caption: str) -> list[Drawing
 
 
 def sweep_page(found: Sweep) -> Page:
-    """The page of a sweep: its tables and pictures, what became of each member, then those that are done compared."""
+    """The page of a sweep: its tables and pictures, a member of the best point in motion, what became of each one, then those that are done
+    compared, and where they come from.
+    """
+    with ExitStack() as stack:
+        one, why = shown_member(found)
+        results = stack.enter_context(open_results(found.folder / one.file)) if one else None
+        return _of_sweep(found, results, f"{one.name}{why}" if one else "")
+
+
+def shown_member(found: Sweep) -> tuple[Entry | None, str]:
+    """The member that stands for the sweep: a run of its best point, else the first one that is done; and why, in words."""
+    best = best_point(found)
+    if best is not None:
+        return next(one for one in found.cases[best.case].entries if one.numbers), ", of the best point"
+    return next((one for one in found.entries if one.numbers), None), ""
+
+
+def _of_sweep(found: Sweep, shown: Results | None, label: str) -> Page:
     head, *tables = [block for block in sweep_text.blocks(found) if block.title != "Warnings"]
     with style():
         drawings = [
@@ -222,12 +242,15 @@ def sweep_page(found: Sweep) -> Page:
         Section("Summary", (Block("", head.header, head.rows, head.left),)),
         Section("Figures", tuple(drawings)),
         Section("Tables", tuple(tables)),
+        *([Section(f"In motion: {label}", player_of(shown, BUDGET))] if shown else []),
         Section("Members", (members(found),)),
     ]
     done = [found.folder / one.file for one in found.entries if one.state == "done"]
-    if len(found.kinds) == 1:
+    if len(found.kinds) == 1 and len(done) <= MOST_COMPARED:
         blocks, more, _ = comparison(done)
         sections.append(Section("Runs compared", (*blocks, *more)))
+    manifest = Listing("The sweep, sweep.toml", (found.folder / NAME).read_text(encoding="utf-8"))
+    sections.append(Section("Scenario and provenance", (*(_sources(shown) if shown else ()), manifest)))
     count = len(found.entries)
     missing = [f"{found.counts[state]} {state}" for state in ("waiting", "failed") if found.counts[state]]
     return Page(
