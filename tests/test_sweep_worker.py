@@ -114,7 +114,7 @@ def test_answers_are_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert Task.from_json(strange.to_json()) == strange
 
 
-def test_a_task_of_a_sweep_that_has_ended_is_not_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_task_of_a_sweep_that_has_ended_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
     """It was killed while this process was starting: nobody would interrupt the task."""
     monkeypatch.setattr(worker, "perform", lambda *_: pytest.fail("begun"))
     got = queue.Queue.get
