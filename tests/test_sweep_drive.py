@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import queue
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -29,7 +30,14 @@ def write(task: Task) -> None:
     with h5py.File(task.target, "w") as file:
         file.attrs.update({"complete": 1, "scenario_hash": task.hash, "program": "dem-cli", "program_version": "9"})
     if task.state:
-        Path(task.state).write_bytes(b"")
+        Path(task.state).write_bytes(pickle.STOP)
+
+
+def write_preparation(store: Store, key: str) -> None:
+    file, state = store.preparation(key)
+    with h5py.File(file, "w") as results:
+        results.attrs["complete"] = 1
+    state.write_bytes(pickle.STOP)
 
 
 class Obedient:
@@ -238,7 +246,7 @@ def test_members_of_another_sweep_are_left_to_it(tmp_path: Path) -> None:
     theirs = one.plan.members[0]
     assert other.claim(theirs.hash)
     tally = one.run()
-    assert (tally.done, tally.elsewhere) == (3, 1)
+    assert (tally.done, tally.elsewhere) == (3, [theirs.hash])
     assert theirs.name not in names(workers)
     other.close()
     one.store.close()
@@ -259,8 +267,7 @@ def test_what_another_sweep_has_found_to_fail_is_not_tried_again(tmp_path: Path)
     """Though ours began before that one wrote it into the manifest; with --retry it is."""
     one = sweeping(tmp_path, workers := Obedient(slots=1))
     other = sweeping(tmp_path, Obedient(lambda task: "failed" if "400gal-20Hz" in task.target else "stopped"))
-    other.store.preparation(next(iter(one.plan.shared)))[0].write_bytes(b"")
-    other.store.preparation(next(iter(one.plan.shared)))[1].write_bytes(b"")
+    write_preparation(one.store, next(iter(one.plan.shared)))
     other.run()
     other.store.close()
     tally = one.run()
@@ -282,14 +289,47 @@ def test_a_preparation_of_another_sweep_is_waited_for(tmp_path: Path) -> None:
 
     def check() -> None:
         if next(looks) == 1:
-            for path in other.preparation(key):
-                path.write_bytes(b"")
+            write_preparation(other, key)
             other.release(key)
 
     assert one.run(check).done == 4
     assert "first 1" not in names(workers)
     other.close()
     one.store.close()
+
+
+@pytest.mark.parametrize("damage", ["engine", "file", "both gone"])
+def test_a_preparation_that_is_damaged_or_gone_is_made_again(tmp_path: Path, damage: str) -> None:
+    """Also while the sweep goes on: it would wait for ever."""
+
+    def ends(task: Task) -> End:
+        if task.stages or damaged:
+            return "done"
+        damaged.append(task)
+        file, state = one.store.preparation(key)
+        if damage == "engine":
+            state.write_bytes(b"\0\0")
+        elif damage == "file":
+            file.write_bytes(file.read_bytes()[:500])
+        else:
+            file.unlink()
+            state.unlink()
+        return "done"
+
+    damaged: list[Task] = []
+    one = sweeping(tmp_path, workers := Obedient(ends, slots=1))
+    (key,) = one.plan.shared
+    assert one.run().done == 4
+    assert names(workers) == ["first 1", "400gal-10Hz", "first 1", "400gal-20Hz", "800gal-10Hz", "800gal-20Hz"]
+    one.store.close()
+
+
+def test_failures_of_one_name_are_counted_each() -> None:
+    tally = Tally(3)
+    for reason in ("a", "b", "c"):
+        tally.fail("friction-1", reason)
+    assert tally.failed == {"friction-1": "a", "friction-1 (2)": "b", "friction-1 (3)": "c"}
+    assert tally.open == 0
 
 
 def test_what_an_interrupted_run_has_left_is_cleared(tmp_path: Path) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
+import threading
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import h5py
 import pytest
@@ -200,3 +204,61 @@ def test_the_manifest_is_readable(tmp_path: Path) -> None:
     assert raw["axis"][0] == {"kind": "grid", "values": {"stage.shake.amplitude": ["400 gal", "800 gal"]}}
     assert raw["member"][3]["settings"] == {"stage.shake.amplitude": "800 gal", "stage.shake.frequency": "20 Hz"}
     store.close()
+
+
+def test_a_member_is_known_under_the_name_that_another_sweep_gave_it(tmp_path: Path) -> None:
+    """Axes that come and go change names, and not what was run: seed 3 is the scenario's own."""
+    before = Store(manifest_of(tmp_path))
+    for member in before.manifest.members[:2]:
+        pretend(before.folder, member)
+    pretend(before.folder, before.manifest.members[2], complete=0)
+    before.close()
+    wider = make_plan(sweep_file(tmp_path, {"grid": GAL_HZ, "seeds": [3, 4]})).manifest(tmp_path / "out")
+    after = Store(wider)
+    after.begin()
+    states = {one.name: one.state for one in after.manifest.members}
+    assert [name for name, state in states.items() if state == "done"] == ["400gal-10Hz-seed3", "400gal-20Hz-seed3"]
+    assert sum(after.is_done(one) for one in after.manifest.members) == 2
+    assert after.manifest.former == (before.manifest.members[2].file,)
+    after.close()
+
+
+def test_sweeps_that_begin_together_find_each_other(tmp_path: Path) -> None:
+    """A job array does: none of them may take a lock that is half taken for a sweep with other members."""
+    manifest, barrier = manifest_of(tmp_path), threading.Barrier(8)
+
+    def begin(_: int) -> Store:
+        barrier.wait()
+        return Store(manifest)
+
+    for _ in range(5):
+        with ThreadPoolExecutor(8) as pool:
+            for store in pool.map(begin, range(8)):
+                store.close()
+
+
+@pytest.mark.parametrize("name", ["lock", "active", "claims/key"])
+def test_a_folder_that_cannot_be_written_is_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    opened = os.open
+
+    def deny(path: Any, *args: Any, **options: Any) -> int:
+        if str(path).endswith(name):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+        return opened(path, *args, **options)
+
+    manifest = manifest_of(tmp_path)
+    monkeypatch.setattr("dem_cli.sweep.store.os.open", deny)
+    with pytest.raises(ResultsError, match=rf"{name}: cannot be written \(Permission denied\)"):
+        Store(manifest).claim("key")
+
+
+def test_what_the_one_who_ran_a_member_wrote_is_kept(tmp_path: Path) -> None:
+    """Another sweep finds the file and knows nothing of how long it took."""
+    one, other = Store(manifest_of(tmp_path)), Store(manifest_of(tmp_path))
+    one.begin()
+    first = one.manifest.members[0]
+    one.record({first.hash: first.with_state("done", seconds=3.0)})
+    other.record({first.hash: first.with_state("done")})
+    assert read_manifest(one.folder).members[0].seconds == 3.0
+    one.close()
+    other.close()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import queue
 import signal
 import subprocess
 import sys
@@ -98,13 +99,35 @@ def test_errors_of_a_run_are_told_apart(
     assert worker.perform(task_of(tmp_path), no_words).end == end
 
 
-def test_answers_are_lines(tmp_path: Path) -> None:
+def test_answers_are_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "IDLE", 0.2)
     out = io.StringIO()
     strange = task_of(tmp_path, program="another")
-    worker.serve(io.StringIO(strange.to_json() + "\n" + strange.to_json() + "\n"), out)
+    ours, theirs = os.pipe()
+    with os.fdopen(ours) as tasks, os.fdopen(theirs, "w") as feed:
+        feed.write(2 * f"{strange.to_json()}\n")
+        feed.flush()
+        worker.serve(tasks, out)
+        feed.close()
     answers = [Answer.from_raw(json.loads(line)) for line in out.getvalue().splitlines()]
     assert [one.end for one in answers] == ["strange", "strange"]
     assert Task.from_json(strange.to_json()) == strange
+
+
+def test_a_task_of_a_sweep_that_has_ended_is_not_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was killed while this process was starting: nobody would interrupt the task."""
+    monkeypatch.setattr(worker, "perform", lambda *_: pytest.fail("begun"))
+    got = queue.Queue.get
+
+    def late(self: Any, **options: Any) -> Any:
+        while self.qsize() < 2:  # the task and the end
+            time.sleep(0.01)
+        return got(self, **options)
+
+    monkeypatch.setattr(queue.Queue, "get", late)
+    out = io.StringIO()
+    worker.serve(io.StringIO("{}\n"), out)
+    assert out.getvalue() == ""
 
 
 def test_a_process_without_work_ends_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:

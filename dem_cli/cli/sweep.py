@@ -65,17 +65,20 @@ def command(
     told. Stages that several members begin with, such as one packing for many ways of shaking, are run once. The
     command may be started several times in one folder, on several machines too: each takes what the others have not.
 
-    Exit codes: 0 all members are done, 1 some failed (a table says why), 2 a mistake of yours, 130 interrupted.
+    Exit codes: 0 all members are done or run by another sweep, 1 some failed (a table says why), 2 a mistake of yours, 130 interrupted.
     """
     from dem_cli.errors import ScenarioError
     from dem_cli.sweep.plan import make_plan
 
+    if scheduler is not None and not scheduler.strip():  # perhaps a variable of the shell that is not set
+        raise ScenarioError("--scheduler: is empty. Give the address of a Dask scheduler, such as tcp://host:8786")
     if jobs and scheduler:
         raise ScenarioError("--jobs and --scheduler exclude each other: a cluster has as many workers as were started")
     plan = make_plan(scenario, overrides, _varied(vary), None if yes else MANY)
+    jobs = jobs or _cores()
     folder = output or Path(f"{scenario.stem}-sweep")
     if dry_run:
-        _list(plan, folder, jobs or _cores())
+        _list(plan, folder, jobs)
         return
 
     from dem_cli.sweep.store import Store
@@ -83,7 +86,7 @@ def command(
     store = Store(plan.manifest(folder))
     try:
         store.begin()
-        tally = _run(settings, plan, store, jobs or _cores(), scheduler, retry)
+        tally = _run(settings, plan, store, jobs, scheduler, retry)
     finally:
         store.close()
     _conclude(settings, tally, store, folder)
@@ -103,9 +106,12 @@ def _varied(texts: Sequence[str]) -> Points:
     found: Points = {}
     for text in texts:
         try:
-            found |= varied(text)
+            axis = varied(text)
         except ValueError as error:
             raise ScenarioError(f"--vary {text}: {error}") from None
+        for name in axis.keys() & found.keys():
+            raise ScenarioError(f"--vary {text}: {name} is varied already. Give all its values in one --vary")
+        found |= axis
     return found
 
 
@@ -158,11 +164,10 @@ def _remarks(plan: Plan, store: Store) -> list[str]:
 def _conclude(settings: Settings, tally: Tally, store: Store, folder: Path) -> None:
     """The table of what failed, and what to do next."""
     if tally.elsewhere:
-        members = {one.hash: one for one in store.manifest.members}
-        who = {store.owner(key) for key in members if store.owner(key) != "another sweep"}
+        count = len(tally.elsewhere)
+        who = sorted({store.owner(key) for key in tally.elsewhere})
         click.echo(
-            f"{tally.elsewhere} member{'s are' if tally.elsewhere > 1 else ' is'} being run by another sweep "
-            f"({', '.join(sorted(who)[:3])})",
+            f"{count} member{'s are' if count > 1 else ' is'} being run by another sweep ({', '.join(who[:3])})",
             err=True,
         )
     if tally.failed:
@@ -186,12 +191,12 @@ def _list(plan: Plan, folder: Path, jobs: int) -> None:
     from dem_cli.cli.estimate import estimate_sweep
     from dem_cli.report.text import Block, show
     from dem_cli.results.manifest import is_sweep, read_manifest
-    from dem_cli.sweep.store import done_file
+    from dem_cli.sweep.store import find_done
 
     written = read_manifest(folder).members if is_sweep(folder) else ()
     records = {one.hash: one for one in written if one.hash}
     guess = estimate_sweep(plan, records)
-    done = {one.hash for one in plan.members if done_file(folder / one.file, one.hash)}
+    done = find_done(folder, plan.members)
     open_members = [one for one in plan.members if one.hash not in done]
     needed = {key for one in open_members if (key := plan.start.get(one.hash))}
     keys = [key for axis in plan.axes for key in axis.keys]

@@ -28,6 +28,7 @@ from dem_cli.scenario.loader import read_toml
 from dem_cli.scenario.overrides import apply_overrides
 from dem_cli.sweep.process import Tell, WorkerProcess
 from dem_cli.sweep.task import Answer, Task
+from dem_cli.sweep.worker import disk_is_full
 
 CONNECT = 15.0  # s until a scheduler must have answered
 COUNT_EVERY = 2.0  # s between two counts of workers
@@ -95,7 +96,11 @@ class ClusterWorkers:
         with self._lock:
             self._tells[task.key] = tell
         done: Future[Answer] = Future()
-        self._send(task, done)
+        done.add_done_callback(lambda _: self._tells.pop(task.key, None))
+        try:
+            self._send(task, done)
+        except (OSError, DemError) as error:  # what is to travel cannot be read
+            done.set_result(Answer("hindered", str(error)))
         return done
 
     def _send(self, task: Task, done: Future[Answer]) -> None:
@@ -122,7 +127,7 @@ class ClusterWorkers:
             _unpack(task, answer)
             done.set_result(replace(answer, content={}))
         except OSError as error:
-            done.set_result(Answer("full" if error.errno == 28 else "hindered", str(error)))
+            done.set_result(Answer("full" if disk_is_full(error) else "hindered", str(error)))
         except Exception as error:
             done.set_exception(error)
 
@@ -160,12 +165,15 @@ class ClusterWorkers:
 def _connect(address: str) -> Any:
     try:
         from distributed import Client
-        from distributed.comm.addressing import parse_address
+        from distributed.comm.addressing import parse_address, parse_host_port
         from distributed.comm.registry import get_backend
     except ImportError:
         raise ClusterError("--scheduler needs Dask: pip install 'dem-cli[cluster]', here and on the workers") from None
-    try:
-        get_backend(parse_address(address)[0])  # a client with an address of no kind would not let go for half a minute
+    try:  # a client with an address of no kind would not let go for half a minute
+        kind, place = parse_address(address)
+        get_backend(kind)
+        if kind != "inproc":
+            parse_host_port(place)
         return Client(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         said = str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol
@@ -43,16 +43,21 @@ class Job:
 
 @dataclass
 class Tally:
-    """Where the sweep is, for those who show it. skipped: done before; elsewhere: being run by another sweep."""
+    """Where the sweep is, for those who show it. skipped: done before; elsewhere: keys of those that another sweep runs."""
 
     total: int
     skipped: int = 0
     done: int = 0
-    elsewhere: int = 0
+    elsewhere: list[str] = field(default_factory=list)
     failed: dict[str, str] = field(default_factory=dict)  # name -> reason
     running: list[Job] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)  # wall times of members that were run
     at_once: int = 1
+
+    def fail(self, name: str, reason: str) -> None:
+        """Members may be of one name where their settings differ in signs that no file name has."""
+        others = sum(1 for one in self.failed if one == name or one.startswith(f"{name} ("))
+        self.failed[f"{name} ({others + 1})" if others else name] = reason
 
     @property
     def open(self) -> int:
@@ -96,13 +101,13 @@ class Sweeping:
     def _collect(self) -> None:
         """Jobs for all members that are neither done nor known to fail, and for what they start from."""
         for one in self.plan.invalid:
-            self.tally.failed[one.name] = one.error
+            self.tally.fail(one.name, one.error)
         for member in self.plan.members:
             record = self._records[member.hash]
             if record.state == "done":
                 self.tally.skipped += 1
             elif failed_before(record) and not self._retry:
-                self.tally.failed[record.name] = record.reason
+                self.tally.fail(record.name, record.reason)
             else:
                 self._need(self.plan.start.get(member.hash))
                 self._jobs[member.hash] = self._member_job(member)
@@ -159,6 +164,8 @@ class Sweeping:
                 if not self._flights and self._jobs:  # all that is left is being done by another sweep
                     if not self._worth_waiting():
                         break
+                    for job in list(self._jobs.values()):
+                        self._need(job.needs)  # may have been removed meanwhile: then nobody would compute it
                     time.sleep(LOOK_EVERY)
         except BaseException:
             self._abort()
@@ -166,7 +173,7 @@ class Sweeping:
         finally:
             self.tally.running = []
             self._record(now=True)
-        self.tally.elsewhere = sum(1 for job in self._jobs.values() if job.member)
+        self.tally.elsewhere = [job.key for job in self._jobs.values() if job.member]
         return self.tally
 
     def _launch(self) -> bool:
@@ -199,14 +206,16 @@ class Sweeping:
         reason = self.store.condemned(job.key)
         if job.member and reason and not there and not self._retry:
             del self._jobs[job.key]
-            self.tally.failed[job.name] = reason
+            self.tally.fail(job.name, reason)
             self.store.condemn(job.key, reason)
             self.store.release(job.key)
             return True
         if there:
             del self._jobs[job.key]
             self.store.release(job.key)
-            self.tally.skipped += job.member is not None
+            if job.member:
+                self.tally.skipped += 1
+                self._news[job.key] = self._records[job.key].with_state("done", program=program_identity())
         return there
 
     def _worth_waiting(self) -> bool:
@@ -256,7 +265,7 @@ class Sweeping:
             self.tally.seconds.append(answer.seconds)
             self.watcher.say(f"{member.name}: done in {answer.seconds:.0f} s")
         else:
-            self.tally.failed[member.name] = answer.reason
+            self.tally.fail(member.name, answer.reason)
             self.watcher.say(f"{member.name}: failed: {answer.reason}")
         self._news[member.hash] = record.with_state(
             state,
@@ -297,13 +306,3 @@ class Sweeping:
                 continue
             if answer.end == "done" and job.member and self._arrived(job):
                 self._end_member(job.member, answer)
-
-
-def outcome(tally: Tally) -> Mapping[str, int]:
-    """Numbers of members: done now, done before, failed, elsewhere."""
-    return {
-        "done": tally.done,
-        "skipped": tally.skipped,
-        "failed": len(tally.failed),
-        "elsewhere": tally.elsewhere,
-    }

@@ -124,6 +124,11 @@ def read_plan(path: Path, varied: Points) -> tuple[Sweep, str]:
         raise ScenarioError(
             line(origin, loc, list(sweep.scenarios), rule, "Take that out, or leave scenarios out", raw)
         )
+    for kind, points in sweep.axes:
+        if kind != "scenario" and "scenario" in points:
+            raise ScenarioError(
+                f'{origin}: [sweep] scenario: is no key of a scenario. Name other files in a list of their own: scenarios = ["discs.toml"]'
+            )
     if not sweep.axes:
         raise ScenarioError(
             f'{origin}: [sweep]: varies nothing. Add a grid to the table, or give --vary "stage.shake.amplitude=400 gal,800 gal"'

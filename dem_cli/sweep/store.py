@@ -13,9 +13,10 @@ import errno
 import fcntl
 import hashlib
 import os
+import pickle
 import secrets
 import socket
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from dem_cli.errors import ResultsError
 from dem_cli.results.files import partial_path
 from dem_cli.results.manifest import NAME, Manifest, Member, read_manifest, write_manifest
 from dem_cli.results.provenance import program_identity
+from dem_cli.sweep.plan import Planned
 
 INNER = ".sweep"
 FAILED = "failed: "  # begins what a claim says of a member that fails
@@ -37,10 +39,12 @@ class Store:
         self.folder = manifest.folder
         self.manifest = manifest
         self._claims: dict[str, int] = {}
+        self._sound: dict[str, tuple[tuple[int, int], ...]] = {}  # times and sizes of preparations that were looked at
         self._verdicts: dict[str, str] = {}  # what was written in a claim before it was ours
         inner = self.folder / INNER
-        known = (self.folder / NAME).exists() or inner.exists()
-        if self.folder.is_dir() and not known and any(self.folder.iterdir()):
+        # Looked at once: another sweep may be making the folder at this moment.
+        there = {path.name for path in self.folder.iterdir()} if self.folder.is_dir() else set()
+        if there and not there & {NAME, INNER}:
             raise ResultsError(
                 f"{self.folder}: holds other files, and is no folder of a sweep. Name another one with -o"
             )
@@ -55,8 +59,12 @@ class Store:
 
     def _join(self) -> int:
         """Hold a lock that tells others which members are worked on here. ResultsError if another sweep with other members is at work."""
+        with self._locked():  # so that two that begin at once do not meet half-way
+            return self._join_alone()
+
+    def _join_alone(self) -> int:
         ours = hashlib.sha256("".join(one.hash for one in self.manifest.members).encode()).hexdigest()
-        handle = os.open(self.folder / INNER / "active", os.O_RDWR | os.O_CREAT, 0o666)
+        handle = self._open("active")
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -67,8 +75,7 @@ class Store:
                     f"{self.folder}: another sweep with other members works there ({who.strip()}). Name another folder with -o, or wait for it"
                 ) from None
         else:
-            os.truncate(handle, 0)
-            os.pwrite(handle, f"{ours} {_ourselves()}".encode(), 0)
+            _write_over(handle, f"{ours} {_ourselves()}")
         with contextlib.suppress(OSError):
             fcntl.flock(handle, fcntl.LOCK_SH)
         return handle
@@ -90,8 +97,16 @@ class Store:
         return folder / f"{key}.h5", folder / f"{key}.state"
 
     def is_prepared(self, key: str) -> bool:
-        """The engine is written last."""
-        return all(path.is_file() for path in self.preparation(key))
+        """Whether a preparation is there, and not cut short by a crash of the machine. The engine is written last."""
+        try:
+            marks = tuple((one.st_mtime_ns, one.st_size) for one in map(os.stat, self.preparation(key)))
+        except OSError:
+            return False
+        if self._sound.get(key) != marks:
+            if not _is_sound(*self.preparation(key)):
+                return False
+            self._sound[key] = marks
+        return True
 
     def discard_partial(self, member: Member) -> None:
         """What an interrupted run of a member has left; it is redone from the start of its own stages."""
@@ -103,7 +118,7 @@ class Store:
         """Take a member or a preparation for this process; False if another one has it."""
         if key in self._claims:
             return True
-        handle = os.open(self.folder / INNER / "claims" / key, os.O_RDWR | os.O_CREAT, 0o666)
+        handle = self._open(f"claims/{key}")
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -111,17 +126,15 @@ class Store:
                 os.close(handle)
                 return False
             # a disk that knows no locks: then there is no protection, but the sweep can go on
-        self._verdicts[key] = os.pread(handle, 100_000, 0).decode(errors="replace")
-        os.truncate(handle, 0)
-        os.pwrite(handle, _ourselves().encode(), 0)
         self._claims[key] = handle
+        self._verdicts[key] = os.pread(handle, 100_000, 0).decode(errors="replace")
+        _write_over(handle, _ourselves())
         return True
 
     def condemn(self, key: str, reason: str) -> None:
         """Leave word with the claim that a member fails, for sweeps that come to it before they read the manifest again."""
         if (handle := self._claims.get(key)) is not None:
-            os.truncate(handle, 0)
-            os.pwrite(handle, f"{FAILED}{program_identity()}\n{reason}".encode(), 0)
+            _write_over(handle, f"{FAILED}{program_identity()}\n{reason}")
 
     def condemned(self, key: str) -> str:
         """Why another sweep with this very program has found a member to fail, since we claimed it; else nothing."""
@@ -146,12 +159,21 @@ class Store:
             self.release(key)
         os.close(self._active)
 
+    def _open(self, name: str) -> int:
+        """A small file that is locked, or says something. ResultsError if it cannot be made."""
+        try:
+            return os.open(self.folder / INNER / name, os.O_RDWR | os.O_CREAT, 0o666)
+        except OSError as error:
+            raise ResultsError(
+                f"{self.folder / INNER / name}: cannot be written ({error.strerror}). No result file is lost"
+            ) from error
+
     # -- the manifest -----------------------------------------------------------------------------------------------
 
     @contextlib.contextmanager
     def _locked(self) -> Iterator[None]:
         """One process at a time reads and writes the manifest."""
-        handle = os.open(self.folder / INNER / "lock", os.O_RDWR | os.O_CREAT, 0o666)
+        handle = self._open("lock")
         try:
             with contextlib.suppress(OSError):
                 fcntl.flock(handle, fcntl.LOCK_EX)
@@ -163,10 +185,13 @@ class Store:
         """Bring the manifest in line with the plan and with what lies in the folder; what others have written of these members is kept."""
         with self._locked():
             before = {one.hash: one for one in self._written() if one.hash}
+            found = find_done(self.folder, self.manifest.members)
             members = []
             for planned in self.manifest.members:
                 known = before.get(planned.hash, planned)
-                done = self.is_done(planned)
+                done = found.get(planned.hash)
+                if done and done.name != planned.file:
+                    os.replace(done, self.folder / planned.file)
                 if done and known.state != "done":
                     known = replace(known, state="done", reason="", program=_program_of(self.folder / planned.file))
                 elif not done and known.state == "done":
@@ -187,6 +212,8 @@ class Store:
             for one in self.manifest.members:
                 other = written.get(one.hash, one)
                 news = changed.get(one.hash)
+                if news and news.state == other.state == "done":  # who has run it knows more of it
+                    news = other if other.seconds == other.seconds else news
                 members.append(news or (other if other.state != "waiting" else one))
             self.manifest = replace(self.manifest, members=tuple(members))
             self._write()
@@ -206,8 +233,28 @@ class Store:
             ) from error
 
 
+def _write_over(handle: int, text: str) -> None:
+    """On a full disk it is left out: the lock counts, the words are for those who ask."""
+    with contextlib.suppress(OSError):
+        os.truncate(handle, 0)
+        os.pwrite(handle, text.encode(), 0)
+
+
 def _ourselves() -> str:
     return f"process {os.getpid()} on {socket.gethostname()}"
+
+
+def find_done(folder: Path, members: Iterable[Member | Planned]) -> dict[str, Path]:
+    """Result files of members that are done, by the member's hash. They may have other names, by the settings of another sweep."""
+    there: dict[str, list[Path]] = {}
+    for path in folder.glob("*.h5"):
+        there.setdefault(path.stem[-8:], []).append(path)
+    found: dict[str, Path] = {}
+    for one in members:
+        places = (folder / one.file, *there.get(one.hash[:8], ())) if one.hash else ()
+        if done := next((path for path in places if done_file(path, one.hash)), None):
+            found[one.hash] = done
+    return found
 
 
 def done_file(path: Path, scenario_hash: str) -> bool:
@@ -215,6 +262,16 @@ def done_file(path: Path, scenario_hash: str) -> bool:
     try:
         with h5py.File(path, "r", locking=False) as file:
             return bool(file.attrs["complete"]) and file.attrs["scenario_hash"] == scenario_hash
+    except (OSError, KeyError):
+        return False
+
+
+def _is_sound(file: Path, state: Path) -> bool:
+    """Whether the files of a preparation are whole: a crash of the machine leaves them short, or full of zeros."""
+    try:
+        with state.open("rb") as handle, h5py.File(file, "r", locking=False) as results:
+            handle.seek(-1, os.SEEK_END)
+            return handle.read() == pickle.STOP and bool(results.attrs["complete"])
     except (OSError, KeyError):
         return False
 

@@ -67,7 +67,7 @@ def perform(task: Task, tell: Callable[[float, str], None]) -> Answer:
     except ScenarioError as error:
         return ended("refused", _line(error))
     except (DemError, OSError) as error:
-        why = "full" if _disk_is_full(error) else "failed" if isinstance(error, RunError) else "hindered"
+        why = "full" if disk_is_full(error) else "failed" if isinstance(error, RunError) else "hindered"
         return ended(why, _line(error))
     except MemoryError:
         return ended("hindered", "out of memory. Run fewer members at a time (--jobs)")
@@ -103,7 +103,7 @@ def _run(task: Task, tell: Callable[[float, str], None]) -> None:
     os.replace(fresh, state)
 
 
-def _disk_is_full(error: BaseException | None) -> bool:
+def disk_is_full(error: BaseException | None) -> bool:
     """Whether this, or what caused it, is a full disk or quota."""
     while error is not None:
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
@@ -122,11 +122,12 @@ def _line(error: BaseException) -> str:
 def serve(tasks: TextIO, out: TextIO) -> None:
     """Answer tasks until none has come for a while; the last one is interrupted where the input ends before it does."""
     waiting: queue.Queue[str | None] = queue.Queue()
-    busy = threading.Event()
+    busy, ended = threading.Event(), threading.Event()
 
     def listen() -> None:
         for line in tasks:
             waiting.put(line)
+        ended.set()
         waiting.put(None)
         if busy.is_set():  # nobody is there to hear the answer
             os.kill(os.getpid(), signal.SIGTERM)
@@ -143,6 +144,8 @@ def serve(tasks: TextIO, out: TextIO) -> None:
         if line is None:
             return
         busy.set()
+        if ended.is_set():  # before it was begun, so that nobody would interrupt it
+            return
         answer = perform(Task.from_json(line), lambda share, words: say(share=share, words=words))
         busy.clear()
         print(answer.to_json(), file=out, flush=True)
