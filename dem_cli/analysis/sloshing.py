@@ -25,7 +25,7 @@ _SIDELOBE = 1 / 300
 """
 
 _PADDING = 8
-_LEAST_SAMPLES = 16
+LEAST_SAMPLES = 16
 
 
 def theory_period(mode: int, width: float, depth: float, gravity: float) -> float:
@@ -88,12 +88,10 @@ def surface_period(
     """
     finite = np.isfinite(mode)
     time, mode = time[finite], mode[finite]
-    if len(time) < _LEAST_SAMPLES:
-        return SurfacePeriod(reason=f"fewer than {_LEAST_SAMPLES} samples of the surface")
-    length = float(time[-1] - time[0])
-    count = 1 + max(_LEAST_SAMPLES, round(length / float(np.median(np.diff(time)))))
-    even = np.linspace(time[0], time[-1], count)
-    signal = _detrended(even, np.interp(even, time, mode))
+    if len(time) < LEAST_SAMPLES:
+        return SurfacePeriod(reason=f"fewer than {LEAST_SAMPLES} samples of the surface")
+    even, signal = _even(time, mode)
+    length, count = float(time[-1] - time[0]), len(even)
     resolution = 1.0 / length
     nyquist = 0.5 * (count - 1) / length
     driving = 1.0 / driving_period if driving_period else math.nan
@@ -122,6 +120,32 @@ def surface_period(
         free_amplitude=free_amplitude,
         reason=reason,
     )
+
+
+def amplitude_spectrum(time: Floats, mode: Floats) -> tuple[Floats, Floats]:
+    """Frequencies [Hz] from 0 on and amplitudes [m] of a record of the surface mode [m] at rising times [s], shape (samples,) each.
+
+    As `surface_period` looks at it: at even times, without its straight line, Hann window, padded by zeros, so that a sine has a peak as
+    high as its amplitude. Both empty for fewer than LEAST_SAMPLES finite samples.
+    """
+    finite = np.isfinite(mode)
+    time, mode = time[finite], mode[finite]
+    if len(time) < LEAST_SAMPLES:
+        return np.zeros(0), np.zeros(0)
+    even, signal = _even(time, mode)
+    window = np.hanning(len(even))
+    size = _PADDING * len(even)
+    amplitude = np.asarray(2.0 * np.abs(np.fft.rfft(signal * window, size)) / window.sum(), dtype=np.float64)
+    frequency = np.fft.rfftfreq(size, float(even[-1] - even[0]) / (len(even) - 1))
+    return np.asarray(frequency, dtype=np.float64), amplitude
+
+
+def _even(time: Floats, mode: Floats) -> tuple[Floats, Floats]:
+    """Even times [s] over the same span, and the record at them less its straight line."""
+    length = float(time[-1] - time[0])
+    count = 1 + max(LEAST_SAMPLES, round(length / float(np.median(np.diff(time)))))
+    even = np.linspace(time[0], time[-1], count)
+    return even, _detrended(even, np.interp(even, time, mode))
 
 
 def _detrended(time: Floats, signal: Floats, frequency: float | None = None) -> Floats:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals")
+AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "normals", "energy-normals")
 
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
@@ -24,7 +24,9 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals"
     metavar="KIND",
     help="One of the kinds below [default: sample, of bodies in 3D scene].",
 )
-@click.option("--time", type=float, metavar="T", help="Sample, rose, scene: the frame nearest to T seconds.")
+@click.option(
+    "--time", type=float, metavar="T", help="Sample, rose, force-distribution, scene: the frame nearest to T seconds."
+)
 @click.option(
     "--frame",
     type=int,
@@ -64,7 +66,15 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals"
 @click.option("--view", metavar="AZIMUTH,ELEVATION", help="Scene: where it is seen from, degrees [default: -62,24].")
 @click.option("--series", metavar="NAME,...", help="Series to draw; implies --what series.")
 @click.option("--grains", metavar="ID,...", help="Histories, trajectories: only these tracked grains.")
-@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, GIF 80].")
+@click.option(
+    "--style",
+    "look",
+    type=click.Choice(["screen", "paper", "paper-wide"]),
+    default="screen",
+    show_default=True,
+    help="Paper: for a column of 85 mm, or two of 170 mm; 8 pt, no titles, which are printed as a caption.",
+)
+@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80].")
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     file: Path,
@@ -83,6 +93,7 @@ def command(
     view: str | None,
     series: str | None,
     grains: str | None,
+    look: str,
     dpi: float | None,
     force: bool,
 ) -> None:
@@ -91,9 +102,12 @@ def command(
     \b
     sample        grains to scale, coloured by a quantity, with force chains
     rose          directions of the contacts between grains, and their fabric
+    force-distribution  density of the normal force over its mean, and its exponential tail
     histories     displacement x, y and rotation of tracked grains
     trajectories  ways of tracked grains
     surface       free surface over place and time, and its antisymmetric mode
+    spectrum      amplitude spectrum of the surface's modes, with the driving frequency and
+                  the frequencies that linear theory and the thesis give a liquid as deep
     energy        ledger of energy as stacked areas
     motion        acceleration, velocity and displacement of the container
     series        any quantity of /series over time, or over increments
@@ -102,6 +116,7 @@ def command(
     Of quasi-static shear tests (figures of Kishino 1988):
     stress-strain   stress ratio and volumetric strain over the shear strain; of closed pores
                     stress path and pore pressure too (7, 9)
+    dilatancy       -de_v/d(e1 - e2) and the dilatancy angle over the shear strain
     forces          contact forces as rectangles at the start and the peak (6, 8, 10)
     normals         rose of contact normals in percent, start and peak (11)
     energy-normals  the same, weighted by elastic energy (12)
@@ -134,7 +149,7 @@ def command(
     from dem_cli.report import animation
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
     from dem_cli.report.kinds import kind_of
-    from dem_cli.report.look import check_target, save, style
+    from dem_cli.report.look import caption, check_target, save, style
     from dem_cli.results import BodyResults, open_results
 
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
@@ -181,12 +196,15 @@ def command(
     with open_results(file) as results:
         if not results.complete:
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
-        with style():
+        with style(look):
             if moving and isinstance(results, BodyResults):
                 _refuse_moment(time is not None or moment)
                 animation.save_animation(results, picture, target, dpi or 80.0)
             else:
-                save(draw(results, picture), target, dpi or 200.0)
+                figure = draw(results, picture)
+                save(figure, target, dpi or (200.0 if look == "screen" else 600.0))
+                if look != "screen":
+                    click.echo(f"caption: {caption(figure)}", err=True)
         if increment is not None:
             shown = float(results.frame_times[choose_frame(results, picture)])
             asked = increment + (results.stages[stage - 1].start if stage else 0.0)
@@ -204,7 +222,7 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
     from dem_cli.errors import ScenarioError
 
     kinds = {
-        "--time": ("sample", "scene", "rose"),
+        "--time": ("sample", "scene", "rose", "force-distribution"),
         "--frame/--last": AT_ONE_FRAME,
         "--increment": AT_ONE_FRAME,
         "--color": ("sample", "scene"),

@@ -14,7 +14,7 @@ from dem_cli.report import thesis
 from dem_cli.report.cases import Case, Pooled
 from dem_cli.report.compare import Comparison
 from dem_cli.report.figures import unknown
-from dem_cli.report.look import COLORS, DIVERGING, largest, new_figure
+from dem_cli.report.look import COLORS, DIVERGING, largest, new_figure, small, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -187,10 +187,10 @@ def draw_grid(cases: Sequence[Case]) -> Figure:
         for (row, column), value in np.ndenumerate(change[kind]):
             cell = _cell(grid.get((amplitudes[row], frequencies[column])))
             dark = math.isfinite(value) and abs(value) > 0.62 * reach
-            ax.text(column, row, cell, ha="center", va="center", fontsize=8, color="white" if dark else "black")
+            ax.text(column, row, cell, ha="center", va="center", fontsize=small(), color="white" if dark else "black")
     if image is not None:
         figure.colorbar(image, ax=axes, aspect=30, pad=0.02).set_label("change of the void ratio by shaking")
-    figure.suptitle("Change of the void ratio, before shaking to after it (- denser)")
+    title(figure, "Change of the void ratio, before shaking to after it (- denser)")
     return figure
 
 

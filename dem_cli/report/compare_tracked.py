@@ -11,7 +11,7 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.cases import Case
-from dem_cli.report.look import COLORS, axis_label, display_unit, largest, new_figure, stage_label
+from dem_cli.report.look import COLORS, axis_label, display_unit, largest, new_figure, stage_label, title
 from dem_cli.report.tracked import Paths, draw_path, paths
 from dem_cli.results import open_results
 from dem_cli.state import Floats
@@ -149,9 +149,11 @@ def draw_histories(found: Columns) -> Figure:
     axes[0][0].set_xlim(0.0, max(float(c.time[-1]) for c in found.columns))
     for ax in axes[-1]:
         ax.set_xlabel("time [s]")
-    figure.supylabel(f"{axis_label('displacement', unit)}; right: {axis_label('rotation', turn_unit)}", fontsize=9.0)
+    figure.supylabel(
+        f"{axis_label('displacement', unit)}; right: {axis_label('rotation', turn_unit)}", fontsize="medium"
+    )
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    figure.suptitle(f"Displacements of grains, {found.title}", parse_math=False)
+    title(figure, f"Displacements of grains, {found.title}")
     return figure
 
 
@@ -179,10 +181,10 @@ def draw_trajectories(found: Columns) -> Figure:
             ax.set_aspect("equal")
     axes[0][0].set_xlim(-half_x, half_x)
     axes[0][0].set_ylim(-half_y, half_y)
-    figure.supxlabel(axis_label("x about the middle of the path", unit), fontsize=9.0)
-    figure.supylabel(axis_label("y about the middle of the path", unit), fontsize=9.0)
+    figure.supxlabel(axis_label("x about the middle of the path", unit), fontsize="medium")
+    figure.supylabel(axis_label("y about the middle of the path", unit), fontsize="medium")
     if lines is not None:
         flat = [ax for row in axes for ax in row]
         figure.colorbar(lines, ax=flat, aspect=40, pad=0.02).set_label("time since the stage began [s]")
-    figure.suptitle(f"Trajectories in the container, {found.title}", parse_math=False)
+    title(figure, f"Trajectories in the container, {found.title}")
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,10 +13,13 @@ from dem_cli.report.look import (
     SEQUENTIAL,
     Extend,
     axis_label,
+    current,
     display_unit,
     extension,
+    footnote,
     heading,
     largest,
+    narrow,
     new_figure,
     place_text,
     stage_label,
@@ -105,7 +108,7 @@ def draw_sample(
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
     heading(figure, results, text)
     if caption:
-        figure.supxlabel(caption, fontsize=8)
+        footnote(figure, caption)
     return figure
 
 
@@ -140,13 +143,24 @@ def _view(results: Results, frame: AnyFrame, shown: Bools) -> tuple[float, float
 def _size(box: tuple[float, float, float, float]) -> tuple[float, float]:
     """Figure size [inch] that fits the view, with room for axes and colour bar."""
     aspect = (box[3] - box[2]) / (box[1] - box[0])
-    width = min(6.0, 8.0 / aspect)
-    return max(width, 2.6) + 1.5, min(max(width * aspect, 1.6), 8.0) + 1.3
+    beside, above = _room()
+    own = current().width
+    width = min(6.0 if own is None else own - beside, 8.0 / aspect)
+    return max(width, 2.6) + beside if own is None else own, min(max(width * aspect, 1.6), 8.0) + above
+
+
+def _room() -> tuple[float, float]:
+    """What axes, colour bar and titles take of the figure's width and height [inch]."""
+    return (1.5, 1.3) if current().titles else (0.55, 0.95) if narrow() else (1.1, 0.45)
 
 
 def _points_per_meter(box: tuple[float, float, float, float]) -> float:
-    width, _ = _size(box)
-    return 72.0 * (width - 1.5) / (box[1] - box[0])
+    wide, high = (size - room for size, room in zip(_size(box), _room(), strict=True))
+    return (
+        72.0
+        * (wide if current().width is None else min(wide, high * (box[1] - box[0]) / (box[3] - box[2])))
+        / (box[1] - box[0])
+    )
 
 
 def _draw_grains(
@@ -194,7 +208,9 @@ def _draw_grains(
         draw_outlines(ax, grains, factor)
     if quantity.kind == "label":
         return
-    bar = ax.figure.colorbar(ellipses, ax=ax, extend=extend, aspect=28, pad=0.02)
+    # In a column of a page the label is longer than a low picture is high.
+    place: Any = {"location": "bottom", "aspect": 40, "shrink": 0.9} if narrow() else {"aspect": 28, "pad": 0.02}
+    bar = ax.figure.colorbar(ellipses, ax=ax, extend=extend, **place)
     label = quantity.label + (" since the stage began" if quantity.since else "")
     bar.set_label(axis_label(label, unit))
     bar.outline.set_linewidth(0.5)
