@@ -17,7 +17,7 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
     "output",
     type=click.Path(path_type=Path),
     metavar="PICTURE",
-    help="PNG, SVG or PDF, of scenes GIF too [default: FILE-WHAT.png].",
+    help="PNG, SVG or PDF; GIF or MP4: an animation of the sample or scene [default: FILE-WHAT.png].",
 )
 @click.option(
     "--what",
@@ -74,7 +74,17 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
     show_default=True,
     help="Paper: for a column of 85 mm, or two of 170 mm; 8 pt, no titles, which are printed as a caption.",
 )
-@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80].")
+@click.option(
+    "--fps",
+    type=click.FloatRange(0.1, 60),
+    help="Animation: frames of the file a second [default: as long as each lasts, 2 to 25; shear tests 10].",
+)
+@click.option(
+    "--speed", type=click.FloatRange(0, min_open=True), help="Animation: simulated seconds a second, in place of --fps."
+)
+@click.option(
+    "--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80, MP4 150]."
+)
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     file: Path,
@@ -94,6 +104,8 @@ def command(
     series: str | None,
     grains: str | None,
     look: str,
+    fps: float | None,
+    speed: float | None,
     dpi: float | None,
     force: bool,
 ) -> None:
@@ -146,11 +158,11 @@ def command(
     """
     # Imported here so that `dem --help` stays quick.
     from dem_cli.errors import ScenarioError
-    from dem_cli.report import animation
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
     from dem_cli.report.kinds import kind_of
     from dem_cli.report.look import caption, check_target, save, style
-    from dem_cli.results import BodyResults, open_results
+    from dem_cli.report.movies import ENDINGS
+    from dem_cli.results import open_results
 
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")
@@ -188,18 +200,24 @@ def command(
     }
     _refuse_idle(picture.what, given)
     target = output or file.with_name(f"{file.stem}-{picture.what}.png")
-    moving = target.suffix.lower() == animation.ENDING and picture.what == "scene"
+    moving = target.suffix.lower() in ENDINGS
     if moving:
-        animation.check_gif(target, force)
+        _check_animation(
+            target, picture.what, force, fps, speed, moment or time is not None or increment is not None, look
+        )
     else:
+        if fps or speed:
+            raise ScenarioError(f"--fps and --speed are for animations: name a .gif or .mp4 with -o, not {target.name}")
         check_target(target, force)
     with open_results(file) as results:
         if not results.complete:
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
         with style(look):
-            if moving and isinstance(results, BodyResults):
-                _refuse_moment(time is not None or moment)
-                animation.save_animation(results, picture, target, dpi or 80.0)
+            if moving:
+                from dem_cli.report.animation import save_animation
+
+                reel = save_animation(results, picture, target, dpi=dpi, fps=fps, speed=speed)
+                click.echo(f"{len(reel.shown)} frames, {reel.seconds:.3g} s", err=True)
             else:
                 figure = draw(results, picture)
                 save(figure, target, dpi or (200.0 if look == "screen" else 600.0))
@@ -242,13 +260,26 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
             raise ScenarioError(f"{option} has no meaning for --what {what}, only for {names}")
 
 
-def _refuse_moment(given: bool) -> None:
+def _check_animation(
+    target: Path, what: str, force: bool, fps: float | None, speed: float | None, moment: bool, look: str
+) -> None:
+    """Raise DemError for what can be no animation, or one that would be overwritten. moment: one frame is asked for."""
     from dem_cli.errors import ScenarioError
+    from dem_cli.report.movies import check_target
 
-    if given:
+    if what not in ("sample", "scene"):
         raise ScenarioError(
-            "an animation shows all frames, or those of --stage; --time, --frame and --last choose one for a picture"
+            f"{target}: --what {what} does not move, only sample and scene do; write .png, .svg or .pdf"
         )
+    if moment:
+        raise ScenarioError(
+            "an animation shows all frames, or those of --stage; --time, --frame, --increment and --last choose one for a picture"
+        )
+    if fps and speed:
+        raise ScenarioError("--fps and --speed exclude each other")
+    if look != "screen":
+        raise ScenarioError(f"--style {look} is for pictures on a page, not for an animation")
+    check_target(target, force)
 
 
 def _angles(text: str) -> tuple[float, float]:

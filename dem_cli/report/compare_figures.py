@@ -189,7 +189,7 @@ def draw_grid(cases: Sequence[Case]) -> Figure:
             dark = math.isfinite(value) and abs(value) > 0.62 * reach
             ax.text(column, row, cell, ha="center", va="center", fontsize=small(), color="white" if dark else "black")
     if image is not None:
-        figure.colorbar(image, ax=axes, aspect=30, pad=0.02).set_label("change of the void ratio by shaking")
+        figure.colorbar(image, ax=axes, aspect=30, pad=0.02).set_label("change of the void ratio")
     title(figure, "Change of the void ratio, before shaking to after it (- denser)")
     return figure
 

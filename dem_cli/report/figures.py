@@ -16,6 +16,8 @@ from dem_cli.results import BodyResults, Results
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from dem_cli.report.sample import Look
+
 # Of runs over time.
 KINDS = (
     "sample",
@@ -78,19 +80,11 @@ def draw(results: Results, picture: Picture) -> Figure:
 
         _check_stage(results, picture)
         return impulse_figures.draw_bodies(results, picture)
-    _check_file(results, picture)
+    check_file(results, picture)
     if picture.what in SHEAR_KINDS:
         return _draw_shear(results, picture)
     if picture.what == "sample":
-        return sample.draw_sample(
-            results,
-            choose_frame(results, picture),
-            color=picture.color or "displacement",
-            chains=picture.chains,
-            bonds=picture.bonds,
-            marks=picture.marks,
-            limits=picture.limits,
-        )
+        return sample.draw_sample(results, choose_frame(results, picture), look_of(picture))
     if picture.what == "rose":
         return rose.draw_rose(results, choose_frame(results, picture))
     if picture.what == "force-distribution":
@@ -113,6 +107,13 @@ def draw(results: Results, picture: Picture) -> Figure:
     if picture.what == "energy":
         return curves.draw_energy(results, window, text)
     return curves.draw_series(results, series_of(results, picture), window, text)
+
+
+def look_of(picture: Picture) -> Look:
+    """How a sample is drawn."""
+    from dem_cli.report.sample import Look
+
+    return Look(picture.color or "displacement", picture.chains, picture.bonds, picture.marks, picture.limits)
 
 
 def _draw_distribution(results: Results, picture: Picture) -> Figure:
@@ -251,7 +252,7 @@ def check_request(picture: Picture) -> None:
         raise ScenarioError(f"--range {low:g},{high:g}: the second number must be the larger")
 
 
-def _check_file(results: Results, picture: Picture) -> None:
+def check_file(results: Results, picture: Picture) -> None:
     from dem_cli.report.quantities import QUANTITIES
 
     if picture.what in BODY_KINDS and picture.what not in KINDS:

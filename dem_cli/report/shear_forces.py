@@ -208,7 +208,7 @@ def panel_rose(ax: PolarAxes, values: Floats, top: float, before: Floats | None 
             np.append(edges, edges[0] + 2.0 * np.pi), np.append(steps, steps[0]), color="black", lw=0.7, label="before"
         )
     ax.set_ylim(0.0, top)
-    most = 2.5 if small else 4.5
+    most = 2.5 if small or narrow() else 4.5
     step = next((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if top / s <= most), 25.0)
     ticks = np.arange(step, top, step)
     ax.set_yticks(ticks.tolist(), [f"{tick:g} %" for tick in ticks], fontsize=5.5 if small else 6.5)
