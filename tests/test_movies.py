@@ -193,9 +193,23 @@ def test_mp4_holds_what_was_drawn(tmp_path: Path) -> None:
     """Grey levels one after the other, an odd size, and repeated pictures."""
     write(tmp_path / "a.mp4", Reel([10, 120, 230], [1, 3, 2], 5.0), lambda k: np.full((41, 63, 3), k, dtype=np.uint8))
     assert probe(tmp_path / "a.mp4")[:2] == (6, (62, 40))
-    reader = imageio_ffmpeg.read_frames(str(tmp_path / "a.mp4"))
-    next(reader)
-    levels = [float(np.frombuffer(data, dtype=np.uint8).mean()) for data in reader]
+    raw = subprocess.run(
+        [
+            find_ffmpeg(),
+            "-loglevel",
+            "error",
+            "-i",
+            str(tmp_path / "a.mp4"),
+            "-f",
+            "rawvideo",
+            "-pix_fmt",
+            "rgb24",
+            "-",
+        ],
+        capture_output=True,
+        check=True,
+    ).stdout
+    levels = np.frombuffer(raw, dtype=np.uint8).reshape(6, -1).mean(axis=1)
     assert levels == pytest.approx([10, 120, 120, 120, 230, 230], abs=4)
 
 
@@ -238,7 +252,9 @@ def test_no_ffmpeg_is_one_line(folder: Path, tmp_path: Path, monkeypatch: pytest
 
 def test_ffmpeg_that_fails_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     broken = tmp_path / "ffmpeg"
-    broken.write_text("#!/bin/sh\necho 'Unknown encoder libx264' >&2\nexit 1\n")
+    broken.write_text(
+        "#!/bin/sh\nfor last; do :; done; echo half > \"$last\"\necho 'Unknown encoder libx264' >&2\nexit 1\n"
+    )
     broken.chmod(0o755)
     monkeypatch.setattr(movies, "find_ffmpeg", lambda: str(broken))
     picture = np.zeros((2000, 1000, 3), dtype=np.uint8)

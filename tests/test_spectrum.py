@@ -26,7 +26,7 @@ G = 9.80665
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return made.make_file(tmp_path_factory.mktemp("run") / "run.h5", columns=5, rows=5, tracks=None)
+    return made.make_file(tmp_path_factory.mktemp("run") / "run.h5", columns=40, rows=5, tracks=None)
 
 
 @pytest.fixture

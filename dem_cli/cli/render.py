@@ -22,7 +22,7 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
 @click.option(
     "--what",
     metavar="KIND",
-    help="One of the kinds below [default: sample, of bodies in 3D scene].",
+    help="One of the kinds above [default: sample, of bodies in 3D scene].",
 )
 @click.option(
     "--time", type=float, metavar="T", help="Sample, rose, force-distribution, scene: the frame nearest to T seconds."
@@ -31,7 +31,7 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
     "--frame",
     type=int,
     metavar="K",
-    help="Sample, rose, scene, forces, normals: frame K from 0, or -1, -2, ... from the last.",
+    help="Sample, rose, scene, force-distribution, forces, normals: frame K from 0, or -1, -2, ... from the last.",
 )
 @click.option(
     "--increment",
@@ -109,51 +109,55 @@ def command(
     dpi: float | None,
     force: bool,
 ) -> None:
-    """Draw a picture from a result FILE and print its name.
+    """Draw a picture, or an animation, from a result FILE and print its name.
 
     \b
-    sample        grains to scale, coloured by a quantity, with force chains
-    rose          directions of the contacts between grains, and their fabric
+    sample              grains to scale, coloured by a quantity, with force chains
+    rose                directions of the contacts between grains, and their fabric
     force-distribution  density of the normal force over its mean, and its exponential tail
-    histories     displacement x, y and rotation of tracked grains
-    trajectories  ways of tracked grains
-    surface       free surface over place and time, and its antisymmetric mode
-    spectrum      amplitude spectrum of the surface's modes, with the driving frequency and
-                  the frequencies that linear theory and the thesis give a liquid as deep
-    energy        ledger of energy as stacked areas
-    motion        acceleration, velocity and displacement of the container
-    series        any quantity of /series over time, or over increments
+    histories           displacement x, y and rotation of tracked grains
+    trajectories        ways of tracked grains
+    surface             free surface over place and time, and its antisymmetric mode
+    spectrum            amplitude spectrum of the surface's modes, the driving frequency, and what
+                        linear theory and the thesis give a liquid as deep
+    energy              ledger of energy as stacked areas
+    motion              acceleration, velocity and displacement of the container
+    series              any quantity of /series over time, or over increments
 
     \b
-    Of quasi-static shear tests (figures of Kishino 1988):
-    stress-strain   stress ratio and volumetric strain over the shear strain; of closed pores
-                    stress path and pore pressure too (7, 9)
-    dilatancy       -de_v/d(e1 - e2) and the dilatancy angle over the shear strain
-    forces          contact forces as rectangles at the start and the peak (6, 8, 10)
-    normals         rose of contact normals in percent, start and peak (11)
-    energy-normals  the same, weighted by elastic energy (12)
-    coordination    principal values of the coordination tensor (13)
-    energy-tensor   principal values of the tensor of elastic energy (14)
-    dissipation     work, dissipation and elastic energy (15)
-    largest-share   share of the contact that dissipates most in each increment (16)
-    ranked          contacts ranked by their share in chosen increments (17)
-    paper           all of them on a page
+    Of quasi-static shear tests (figures of Kishino 1988), beside sample, rose, force-distribution,
+    histories, trajectories and series:
+    stress-strain       stress ratio and volumetric strain over the shear strain; of closed pores
+                        stress path and pore pressure too (7, 9)
+    dilatancy           -de_v/d(e1 - e2) and the dilatancy angle over the shear strain
+    forces              contact forces as rectangles at the start and the peak (6, 8, 10)
+    normals             rose of contact normals in percent, start and peak (11)
+    energy-normals      the same, weighted by elastic energy (12)
+    coordination        principal values of the coordination tensor (13)
+    energy-tensor       principal values of the tensor of elastic energy (14)
+    dissipation         work, dissipation and elastic energy (15)
+    largest-share       share of the contact that dissipates most in each increment (16)
+    ranked              contacts ranked by their share in chosen increments (17)
+    paper               all of them on a page
 
     \b
     Of bodies in 3D, beside energy, series, histories and trajectories (in plan and section):
-    scene           bodies, planes and terrain, shaded; as a GIF (-o NAME.gif) all frames, or those of --stage
-    check           velocity over time beside the closed form that [output] check names
-    runout          how far bodies ran from where they started
+    scene               bodies, planes and terrain, shaded
+    check               velocity over time beside the closed form that [output] check names
+    runout              how far bodies ran from where they started
 
-    Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
-    normals show one frame with --increment, --frame or --last.
+    Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces,
+    normals and force-distribution show one frame with --increment, --frame or --last.
+
+    With -o NAME.gif or NAME.mp4 sample and scene become an animation: all frames, or those of --stage, with the same
+    axes and colours throughout.
 
     QUANTITY is radius, id, body, aspect, orientation, speed, spin, displacement, displacement_x,
     displacement_y, rotation, coordination, pressure, shear_stress, stress_xx, stress_yy or stress_xy;
     displacement and rotation count from the start of the frame's stage. Grains of several discs have one
-    displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only tells
-    grains apart. Of scenes it is kind, id, speed, spin, kinetic, displacement, rotation, height, mass or
-    coordination. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
+    displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only
+    tells grains apart. Of scenes it is kind, id, speed, spin, kinetic, displacement, rotation, height, mass or
+    coordination. Histories, trajectories, surface, spectrum and motion show the last stage of shaking unless --stage
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.

@@ -140,7 +140,7 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
         ax.set_aspect("equal")
         ax.set_xlim(middle_x[k] - half_x, middle_x[k] + half_x)
         ax.set_ylim(middle_y[k] - half_y, middle_y[k] + half_y)
-        ax.locator_params(**({"nbins": 2, "steps": [1, 5, 10]} if narrow() else {"nbins": 4}))
+        ax.locator_params(**({"nbins": 2, "min_n_ticks": 1} if narrow() else {"nbins": 4}))
         ax.set_title(f"No. {tracked.ids[k]}")
         _outer_labels(ax, k, count, columns, axis_label("x - x$_0$", unit), axis_label("y - y$_0$", unit))
     if lines is not None:
