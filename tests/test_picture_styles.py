@@ -180,3 +180,25 @@ def test_clashes_are_found() -> None:
     figure.text(0.95, 0.1, "far too long")
     assert sorted(clashes(figure)) == ["'one' on 'two'", "over the edge: 'far too long'"]
     assert len(texts(figure)) == 3
+
+
+def test_long_names_are_folded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs that differ in a setting are named by it."""
+    from dem_cli.report import look
+
+    seen: list[Any] = []
+    original = look.save
+    monkeypatch.setattr(look, "save", lambda figure, *rest: (seen.extend(clashes(figure)), original(figure, *rest)))
+    files = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    for columns, file in zip((12, 8), files, strict=True):
+        made.make_file(file, interval=0.1, columns=columns, rows=16)  # of another width
+    for what in ("table", "histories", "trajectories"):
+        result = CliRunner().invoke(
+            compare, [*map(str, files), "--what", what, "--style", "paper", "-o", str(tmp_path / f"{what}.png")]
+        )
+        assert result.exit_code == 0, result.exception
+    assert seen == []
+    assert (
+        "packed (ring) and after shaking (dot)"
+        in CliRunner().invoke(compare, [*map(str, files), "--style", "paper", "-o", str(tmp_path / "again.svg")]).stderr
+    )

@@ -89,6 +89,8 @@ STYLES = {
     "paper-wide": Style(_PAPER, "STIXGeneral", 170.0 / 25.4, titles=False, small=7.0),
 }
 _CURRENT: ContextVar[Style] = ContextVar("style", default=STYLES["screen"])
+LETTERS = {True: 11.5, False: 14.0}  # an inch, of styles with titles and without
+HIGHEST = 9.5  # inch, of a figure on a page
 NARROW = 4.5  # inch, below which what stands side by side goes below each other
 
 # Fonts with Japanese glyphs, for titles; the first that is installed is used beside the default.
@@ -183,6 +185,14 @@ def folded(text: str) -> str:
     return "\n".join(text.rsplit(", ", 1)) if narrow() else text
 
 
+def wrapped(text: str, width: float) -> str:
+    """Lines of text folded to `width` inches, by the mean width of letters of the style's titles."""
+    import textwrap
+
+    letters = max(int(width * LETTERS[_CURRENT.get().titles]), 8)
+    return "\n".join(textwrap.fill(line, letters) for line in text.split("\n"))
+
+
 def new_figure(width: float, height: float, *, rigid: bool = False, page: bool = False) -> Figure:
     """Figure of `width` x `height` inches that belongs to no window; of the style's width where it has one, of two columns for a `page`.
 
@@ -195,7 +205,7 @@ def new_figure(width: float, height: float, *, rigid: bool = False, page: bool =
         own = STYLES["paper-wide"].width
     if own is not None:
         ratio = own / width
-        height *= ratio if rigid else min(ratio, 1.0) ** 0.6
+        height = min(height * (ratio if rigid else min(ratio, 1.0) ** 0.6), HIGHEST)
         width = own
     return Figure(figsize=(width, height), layout="constrained")
 
@@ -237,18 +247,14 @@ def heading(figure: Figure, results: Results, text: str) -> None:
 
 def title(figure: Figure, text: str, name: str = "") -> None:
     """`text` below the name of the run: over the picture, or in its caption where the style has no titles."""
-    import textwrap
-
-    _say(figure, f"{name}: {text}" if name else text)
+    describe(figure, f"{name}: {text}" if name else text)
     if _CURRENT.get().titles:
-        wide = int(11.5 * figure.get_figwidth())
-        lines = [line for part in (name, *text.split("\n")) for line in textwrap.wrap(part, wide)]
-        figure.suptitle("\n".join(lines), parse_math=False)
+        figure.suptitle(wrapped(f"{name}\n{text}" if name else text, figure.get_figwidth()), parse_math=False)
 
 
 def footnote(figure: Figure, text: str, size: float | None = None) -> None:
     """What else must be known: small (`size` points), under the picture, or in its caption where the style has no titles."""
-    _say(figure, text)
+    describe(figure, text)
     if _CURRENT.get().titles:
         import textwrap
 
@@ -262,7 +268,8 @@ def caption(figure: Figure) -> str:
     return str(figure.get_label())
 
 
-def _say(figure: Figure, text: str) -> None:
+def describe(figure: Figure, text: str) -> None:
+    """Add a part to the caption."""
     one = text.replace("\n", "; ")
     figure.set_label(f"{caption(figure)}; {one}" if caption(figure) else one)
 
