@@ -123,3 +123,9 @@ def test_what_has_no_spectrum_is_one_line(results: Results, tmp_path: Path) -> N
     few = made.make_file(tmp_path / "few.h5", columns=5, rows=5, interval=0.5, tracks=None)
     with open_results(few) as other, pytest.raises(ScenarioError, match="fewer than 16 rows of the surface"):
         drawn(other)
+
+
+def test_why_the_report_found_no_period_is_told(tmp_path: Path) -> None:
+    slow = made.make_file(tmp_path / "slow.h5", columns=5, rows=5, interval=0.05, tracks=None)
+    with open_results(slow) as other:
+        assert "too seldom for the driving period of 0.1 s" in drawn(other).get_supxlabel()

@@ -85,11 +85,9 @@ def draw_spectrum(results: Results, number: int, text: str) -> Figure:
         figure.legend(loc="outside right center", fontsize=small())
     depth, depth_unit = display_unit("m", report.depth)
     heading(figure, results, f"Spectrum of the free surface, {text}")
-    footnote(
-        figure,
-        f"fn: linear theory of a liquid as deep as the fill was before the stage ({report.depth / depth:.4g} {depth_unit}), "
-        f"fn² = (n g/4πl) tanh(nπh/l)\nHann window, resolution {1.0 / float(np.ptp(first[0])):.3g} Hz",
-    )
+    note = f"fn: linear theory of a liquid as deep as the fill was before the stage, {report.depth / depth:.4g} {depth_unit}"
+    note += f"\nfn² = (n g/4πl) tanh(nπh/l); Hann window, resolution {1.0 / float(np.ptp(first[0])):.3g} Hz"
+    footnote(figure, note + (f"\n{report.reason}" if report.reason else ""))
     return figure
 
 
