@@ -13,6 +13,10 @@ class ScenarioError(DemError):
     exit_code = 2
 
 
+class OverrideError(ScenarioError):
+    """A change to a scenario, from the command line or a sweep, that names no key of it, or no single one."""
+
+
 class ResultsError(DemError):
     """A result file is missing, of another kind or version, or would be overwritten."""
 

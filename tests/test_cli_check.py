@@ -133,6 +133,17 @@ def test_warnings(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
     assert len(result.stderr.splitlines()) == 1
 
 
+def test_a_sweep_is_told_by_its_members(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(small({"sweep": {"grid": {"contact.friction": [0.1, 0.2]}, "seeds": 3}}), encoding="utf-8")
+    last = CliRunner().invoke(main, ["check", str(path)]).stdout.splitlines()[-1]
+    assert last.split(maxsplit=1) == ["sweep", f"6 members: dem sweep {path} --dry-run lists them"]
+    found = CliRunner().invoke(main, ["check", str(path), "--set", "sweep.seeds=4"])
+    assert (found.exit_code, len(found.stderr.splitlines())) == (2, 1)
+    path.write_text('[sweep]\nscenarios = ["b.toml"]\n', encoding="utf-8")
+    assert "Run it with dem sweep" in CliRunner().invoke(main, ["check", str(path)]).stderr
+
+
 def test_mistakes_end_with_2(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text(small({"contact.frction": 1, "seed": -1}))
     result = check(str(tmp_path / "a.toml"))

@@ -34,9 +34,11 @@ MAY_IMPORT: dict[str, set[str]] = {
     "analysis": {"errors", "state", "rigid", "geometry", "jit"},
     "report": BASE | {"results", "analysis", "state", "rigid"},
     "interrupts": set(),
+    "pace": STARTS,
     "run": STARTS | {"assembly", "engines", "results", "analysis", "interrupts"},
-    "sweep": STARTS | {"run", "results"},
-    "cli": STARTS | {"assembly", "engines", "results", "analysis", "report", "run", "sweep", "jit"},
+    "sweep": STARTS | {"run", "results", "pace"},
+    "cli": STARTS
+    | {"assembly", "engines", "results", "analysis", "report", "run", "sweep", "jit", "pace", "interrupts"},
     "__init__": {"errors", "scenario", "results", "run"},
     "__main__": {"cli"},
 }

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from scenario_text import small
 
 from dem_cli.cli import main
-from dem_cli.cli.progress import PACKING_EVERY, progress_of
+from dem_cli.cli.progress import PACKING_EVERY, Progress
 from dem_cli.scenario import Scenario, load_scenario, parse_scenario
 
 METHODS = ("falling", "rejection", "local-move", "growth", "insertion")
@@ -89,7 +89,7 @@ def test_run_shows_packings_that_take_their_time(
     (tmp_path / "a.toml").write_text(small({"packing": {"method": "growth"}}), encoding="utf-8")
     now = 100.0
     monkeypatch.setattr("time.monotonic", lambda: now)
-    with progress_of(load_scenario(tmp_path / "a.toml")) as progress:
+    with Progress(load_scenario(tmp_path / "a.toml")) as progress:
         progress.packing("growth: first")
         now += 0.9 * PACKING_EVERY
         progress.packing("growth: early")

@@ -21,8 +21,10 @@ from dem_cli.analysis.quasi_static import branch_stress, measure_increment
 from dem_cli.assembly import Assembly
 from dem_cli.cli import main
 from dem_cli.cli import progress as progress_module
-from dem_cli.cli.progress import IncrementProgress, TimeProgress, clock, progress_of
+from dem_cli.cli.progress import Progress
+from dem_cli.engines.pausing import Pausable
 from dem_cli.errors import ResultsError, RunError
+from dem_cli.pace import IncrementPace, TimePace, clock, condition, pace_of
 from dem_cli.results import open_results, partial_path
 from dem_cli.scenario import QuasiStaticScenario, load_scenario, parse_scenario
 from dem_cli.state import Increment
@@ -45,13 +47,15 @@ def stand(monkeypatch: pytest.MonkeyPatch) -> Stand:
     """stand(increments, error): an engine that yields them, then raises `error` if there is one; returns the scenario."""
 
     def install(given: list[Increment], error: BaseException | None = None) -> QuasiStaticScenario:
-        class Engine:
+        class Engine(Pausable):
             def __init__(self, scenario: QuasiStaticScenario, assembly: Assembly) -> None:
                 assert assembly.warnings == ("the packing is loose",)
                 assert scenario.engine == "granular-element"
+                self.scenario, self.assembly = scenario, assembly
                 self.check: Callable[[], None] = lambda: None
 
-            def increments(self) -> Iterator[Increment]:
+            def increments(self, until: int | None) -> Iterator[Increment]:
+                assert until is None
                 yield from given
                 if error is not None:
                     raise error
@@ -155,11 +159,9 @@ def test_nothing_is_done_where_a_file_is_in_the_way(
     assert (tmp_path / "out.h5").read_text() == "mine"
 
 
-def listen(given: list[Increment], scenario: QuasiStaticScenario, seconds: float) -> IncrementProgress:
+def listen(given: list[Increment], scenario: QuasiStaticScenario, seconds: float) -> Progress:
     """A listener told of increments that take `seconds` each; to be used with a clock of its own."""
-    progress = progress_of(scenario)
-    assert isinstance(progress, IncrementProgress)
-    with progress:
+    with Progress(scenario) as progress:
         for one in given:
             Clock.now += seconds
             progress(one, measure_increment(one, DEPTH, KN, KT).row)
@@ -214,14 +216,14 @@ def test_time_left_counts_later_stages(stand: Stand) -> None:
     scenario = stand(states(), None)
     given = states()[:3]  # 2 of 4 levels, 20 increments later
     progress = listen(given, scenario, 2.0)
-    assert progress.words(given[-1]).endswith(f"about {clock(2.0 * 22)} left")
-    assert progress.share(given[-1]) == pytest.approx(2.0 / 24.0)
-    assert progress.share(states()[-1]) == 1.0
+    assert progress.pace.words(given[-1]).endswith(f"about {clock(2.0 * 22)} left")
+    assert progress.pace.share(given[-1]) == pytest.approx(2.0 / 24.0)
+    assert progress.pace.share(states()[-1]) == 1.0
 
 
 def test_a_quiet_run_says_nothing(stand: Stand, capsys: pytest.CaptureFixture[str]) -> None:
     scenario = stand(states(), None)
-    with progress_of(scenario, verbosity=-1) as progress:
+    with Progress(scenario, verbosity=-1) as progress:
         for one in states():
             progress(one, measure_increment(one, DEPTH, KN, KT).row)
     assert capsys.readouterr().err == ""
@@ -229,14 +231,23 @@ def test_a_quiet_run_says_nothing(stand: Stand, capsys: pytest.CaptureFixture[st
 
 def test_pore_pressure_is_told_where_pores_are_closed() -> None:
     one = replace(shear_test(20)[12], pore_pressure=2500.0)
-    words = progress_module.condition(measure_increment(one, DEPTH, KN, KT).row)
+    words = condition(measure_increment(one, DEPTH, KN, KT).row)
     assert words.endswith(", pore pressure 2.5 kPa")
-    assert progress_module.condition(measure_increment(lattice(), DEPTH, KN, KT).row) == "mean stress 15 kPa"
+    assert condition(measure_increment(lattice(), DEPTH, KN, KT).row) == "mean stress 15 kPa"
 
 
 def test_the_kind_of_scenario_decides() -> None:
-    assert isinstance(progress_of(parse_scenario(resolved(lattice()))), IncrementProgress)
-    assert isinstance(progress_of(few_grains.scenario()), TimeProgress)
+    assert isinstance(pace_of(parse_scenario(resolved(lattice()))), IncrementPace)
+    assert isinstance(pace_of(few_grains.scenario()), TimePace)
+
+
+@pytest.mark.usefixtures("own_clock")
+def test_shares_of_a_part_count_its_stages_alone(stand: Stand) -> None:
+    """Of a preparation, and of a run that goes on from one."""
+    scenario, given = stand(states(), None), states()
+    first, rest = pace_of(scenario, until=1), pace_of(scenario, begin=1)
+    assert first.share(given[2]) == pytest.approx(2.0 / 4.0)
+    assert (rest.share(given[5]), rest.share(given[15])) == (0.0, pytest.approx(10.0 / 20.0))
 
 
 REAL = """

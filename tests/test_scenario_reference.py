@@ -13,6 +13,7 @@ from scenario_text import ABSENT, small
 from dem_cli.scenario import parse_scenario
 from dem_cli.scenario.engines import ALL_STAGES, ENGINES
 from dem_cli.scenario.reference import json_schema, reference_markdown
+from dem_cli.scenario.sweep import Sweep
 from dem_cli.scenario.table import Table, _good_values
 
 # Keys from which defaults of others follow.
@@ -35,7 +36,10 @@ def all_tables(start: type[Table]) -> set[type[Table]]:
     return found
 
 
-TABLES = sorted(set.union(*(all_tables(scenario) for scenario in ENGINES.values())), key=lambda table: table.__name__)
+TABLES = sorted(
+    set.union(all_tables(Sweep), *(all_tables(scenario) for scenario in ENGINES.values())),
+    key=lambda table: table.__name__,
+)
 SCENARIOS = set(ENGINES.values())
 
 
@@ -102,6 +106,17 @@ def test_schema_takes_what_the_model_takes() -> None:
     assert valid(
         small({"grains.radius": "7 mm", "contact.wall_friction": {"bottom": 0.1}, "integration.time_step": "auto"})
     )
+
+
+def test_schema_knows_sweeps() -> None:
+    """Beside a scenario, or alone if it names other files."""
+    grid = {"stage.shake.amplitude": ["400 gal"], "seed": {"from": 1, "to": 5, "step": 1}}
+    assert valid(small({"sweep": {"grid": grid, "seeds": 3, "zip": {"a": [1], "b": [2]}}}))
+    assert valid('title = "all"\n[sweep]\nscenarios = ["a.toml"]\nseeds = [1, 2]\n')
+    assert not valid('title = "all"\n[sweep]\nseeds = [1, 2]\n')
+    assert not valid(small({"sweep": {"grids": grid}}))
+    assert not valid(small({"sweep": {"grid": {"a": []}}}))
+    assert not valid(small({"sweep": {"seeds": "all"}}))
 
 
 @pytest.mark.parametrize(

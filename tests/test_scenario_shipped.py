@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 from dem_cli.scenario import Scenario, Settle, Shake, load_scenario
 from dem_cli.scenario.shipped import shipped_scenarios
+from dem_cli.sweep.plan import make_plan
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
-FILES = sorted(FOLDER.glob("*.toml"))
+ALL = sorted(FOLDER.glob("*.toml"))
+SWEEPS = [path for path in ALL if "\nscenarios" in path.read_text(encoding="utf-8")]
+FILES = [path for path in ALL if path not in SWEEPS]
 
 
 def test_they_are_those_of_the_folder() -> None:
-    assert [one.name for one in shipped_scenarios()] == [path.stem for path in FILES]
+    assert [one.name for one in shipped_scenarios()] == [path.stem for path in ALL]
     assert {"shake-quick", "thesis-discs-400gal-10hz", "thesis-discs-1200gal-1hz"} <= {path.stem for path in FILES}
 
 
@@ -27,6 +31,17 @@ def test_loads_and_says_what_it_shows(path: Path) -> None:
     assert len(one.shows) > 20
     assert one.takes
     assert one.text == path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
+def test_sweeps_have_their_members(path: Path) -> None:
+    one = next(s for s in shipped_scenarios() if s.name == path.stem)
+    plan = make_plan(path)
+    members = {"thesis-grid": (18, 2), "thesis-shapes": (9, 0)}[path.stem]
+    assert (len(plan.members), len(plan.shared), plan.invalid, plan.twins) == (*members, (), 0)
+    assert set(one.files) == {member.base.name for member in plan.members}
+    assert len(one.shows) > 20
+    assert re.match(r"[a-z].*(minutes|hour)", one.takes)
 
 
 def thesis(name: str) -> Scenario:

@@ -19,6 +19,11 @@ QUIET = 0.02
 FALSE_ALARM = 0.01
 """Chance that white noise alone is taken for a period."""
 
+_STEADY = 0.5
+"""Share of a record, at its end, that counts as steady, if it holds _STEADY_PERIODS."""
+
+_STEADY_PERIODS = 2
+
 _SIDELOBE = 1 / 300
 """Share of the strongest power below which a peak may be a side lobe of the Hann window (these stay below
 1/1300).
@@ -148,15 +153,61 @@ def _even(time: Floats, mode: Floats) -> tuple[Floats, Floats]:
     return even, _detrended(even, np.interp(even, time, mode))
 
 
+@dataclass(frozen=True)
+class DrivenMotion:
+    """Oscillation at the driving frequency in the steady part of a record. NaN where it cannot be told; `reason` then says why.
+
+    amplitude [m]; rest [m]: root mean square of what else moves there, a straight line apart; start, end [s] of the steady part,
+    and the whole driving periods in it.
+    """
+
+    amplitude: float = math.nan
+    rest: float = math.nan
+    start: float = math.nan
+    end: float = math.nan
+    periods: int = 0
+    reason: str = ""
+
+
+def driven_motion(time: Floats, mode: Floats, driving_period: float, ramp: float = 0.0) -> DrivenMotion:
+    """Amplitude [m] at the driving frequency of the surface mode [m] at rising times [s], shape (samples,) each.
+
+    The steady part is the second half of the record, but two driving periods at least, cut to whole periods at its start;
+    the shaking's `ramp` [s] is left out at both ends. There a straight line and a sine are fitted by least squares.
+    """
+    finite = np.isfinite(mode)
+    time, mode = time[finite], mode[finite]
+    if len(time) < LEAST_SAMPLES:
+        return DrivenMotion(reason=f"fewer than {LEAST_SAMPLES} samples of the surface")
+    first, end = float(time[0]) + ramp, float(time[-1]) - ramp
+    tiny = 1e-6 * driving_period
+    periods = max(int((_STEADY * (end - first) + tiny) / driving_period), _STEADY_PERIODS)
+    start = end - periods * driving_period
+    if start < first + driving_period - tiny:
+        text = f"shaken for less than {_STEADY_PERIODS + 1} driving periods of {driving_period:.3g} s"
+        return DrivenMotion(reason=text)
+    inside = (time >= start - tiny) & (time <= end + tiny)
+    samples = int(np.count_nonzero(inside))
+    if samples < 2.5 * periods or samples < LEAST_SAMPLES:
+        return DrivenMotion(reason=f"sampled too seldom for the driving period of {driving_period:.3g} s")
+    fit, rest = _fitted(time[inside], mode[inside], 1.0 / driving_period)
+    return DrivenMotion(float(np.hypot(fit[2], fit[3])), float(np.sqrt(np.mean(rest**2))), start, end, periods)
+
+
 def _detrended(time: Floats, signal: Floats, frequency: float | None = None) -> Floats:
     """The signal less its straight line and its oscillation at `frequency` [Hz], by least squares."""
+    return _fitted(time, signal, frequency)[1]
+
+
+def _fitted(time: Floats, signal: Floats, frequency: float | None) -> tuple[Floats, Floats]:
+    """Level, slope and, with a `frequency` [Hz], cosine and sine that fit the signal best, and what is left of it."""
     t = time - time.mean()
     columns = [np.ones_like(t), t]
     if frequency is not None:
         columns += [np.cos(2.0 * np.pi * frequency * t), np.sin(2.0 * np.pi * frequency * t)]
     basis = np.stack(columns, axis=1)
-    fitted: Floats = basis @ np.linalg.lstsq(basis, signal, rcond=None)[0]
-    return signal - fitted
+    fit: Floats = np.linalg.lstsq(basis, signal, rcond=None)[0]
+    return fit, signal - basis @ fit
 
 
 def _strongest(time: Floats, signal: Floats, least: float, avoid: float) -> tuple[float, float, str]:

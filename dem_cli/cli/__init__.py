@@ -17,6 +17,7 @@ COMMANDS = {
     "init": "List the scenarios that come along, or write one to start from.",
     "check": "Check a scenario; print derived constants, time step, run time.",
     "run": "Run a scenario; write a result file.",
+    "sweep": "Run a scenario over a grid of its keys, on all cores or a cluster.",
     "report": "Print what a result file says; compare several.",
     "compare": "Compare runs side by side, and with the thesis; draw it.",
     "render": "Draw a picture from a result file.",
@@ -90,6 +91,7 @@ def main(ctx: click.Context, verbose: int, quiet: bool) -> None:
       dem check shake-quick.toml             what it stands for, and how long it will take
       dem run shake-quick.toml               run it
       dem report shake-quick.h5              what came out
+      dem sweep shake-quick.toml --vary ...  run it for many values of a key
 
     Exit codes: 0 done, 1 the run failed, 2 a mistake of yours, 130 interrupted.
     """

@@ -42,6 +42,8 @@ def command(scenario: Path, overrides: tuple[str, ...], as_json: bool, resolved:
 
         click.echo(json.dumps(derived.as_dict(), indent=2, ensure_ascii=False))
         return
+    if loaded.sweep:
+        lines.append(("sweep", f"{loaded.sweep.count:,} members: dem sweep {scenario} --dry-run lists them"))
     for label, text in lines:
         click.echo(f"{label:<18}{text}".rstrip())
     for warning in derived.warnings:

@@ -35,7 +35,7 @@ def command(name: str | None, output: Path | None, force: bool) -> None:
     _write(content, target, force=force)
     for path in content:
         click.echo(str(path))
-    click.echo(f"Next: dem check {target}", err=True)
+    click.echo(f"Next: dem sweep {target} --dry-run" if one.sweeps else f"Next: dem check {target}", err=True)
 
 
 def _write(content: Mapping[Path, bytes], scenario: Path, *, force: bool) -> None:

@@ -11,7 +11,7 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
 
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
-@click.argument("file", type=click.Path(path_type=Path), metavar="FILE")
+@click.argument("file", type=click.Path(path_type=Path), metavar="FILE|SWEEP")
 @click.option(
     "-o",
     "output",
@@ -109,7 +109,7 @@ def command(
     dpi: float | None,
     force: bool,
 ) -> None:
-    """Draw a picture, or an animation, from a result FILE and print its name.
+    """Draw a picture, or an animation, from a result FILE, or a picture of a SWEEP, and print its name.
 
     \b
     sample              grains to scale, coloured by a quantity, with force chains
@@ -146,6 +146,13 @@ def command(
     check               velocity over time beside the closed form that [output] check names
     runout              how far bodies ran from where they started
 
+    \b
+    Of a SWEEP, its folder or sweep.toml:
+    map                 change of the void ratio, or --color MEASURE (named as in dem report --json), over
+                        two axes; over one axis curves (the default)
+    resonance           the surface's motion over the driving period by T1
+    shapes              shapes or scenarios side by side, before and after
+
     Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces,
     normals and force-distribution show one frame with --increment, --frame or --last.
 
@@ -161,6 +168,7 @@ def command(
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.
+    from dem_cli.cli import of_sweep
     from dem_cli.errors import ScenarioError
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
     from dem_cli.report.kinds import kind_of
@@ -168,6 +176,12 @@ def command(
     from dem_cli.report.movies import ENDINGS
     from dem_cli.results import open_results
 
+    if of_sweep.asked_for([file]):
+        context = click.get_current_context()
+        source = click.core.ParameterSource.COMMANDLINE
+        options = {name for name in context.params if context.get_parameter_source(name) is source}
+        of_sweep.render(file, output, what, color, options, look, dpi, force)
+        return
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")
     three = kind_of([file]) == "bodies" if file.is_file() else False

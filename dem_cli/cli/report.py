@@ -8,7 +8,7 @@ import click
 
 
 @click.command(name="report", short_help="Print what a result file says; compare several.")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE...")
+@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path), metavar="FILE|SWEEP...")
 @click.option("--json", "as_json", is_flag=True, help="The same numbers for machines: SI units, null where undefined.")
 @click.option(
     "--csv",
@@ -17,8 +17,9 @@ import click
     metavar="DIR",
     help="Also write the tables as CSV into DIR.",
 )
+@click.option("--each", is_flag=True, help="Of a sweep: a row for each run too, not only for each point.")
 @click.option("--force", is_flag=True, help="Overwrite CSV tables that exist.")
-def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: bool) -> None:
+def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, each: bool, force: bool) -> None:
     """Print what result FILEs say.
 
     One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
@@ -29,15 +30,22 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, force: 
     the dataclasses in dem_cli/report/summary.py, of shear tests shear.py, of bodies impulse.py. --csv writes
     series.csv, stages.csv, surface.csv (shear tests: dissipation.csv; bodies: check.csv, runout.csv) and
     tracks.csv; with several FILEs into one folder a file below DIR.
+
+    SWEEP, the folder of a sweep or its sweep.toml: a row a point with seeds pooled (mean and its 95 % confidence
+    interval), the best point, failed members with their reasons. --csv writes cases.csv and members.csv.
     """
     # Imported here so that `dem --help` stays quick.
     import json
     import sys
 
+    from dem_cli.cli import of_sweep
     from dem_cli.report import export, impulse, impulse_csv, impulse_text, shear, shear_text, summary, text
     from dem_cli.report.kinds import kind_of
     from dem_cli.results import BodyResults, open_results
 
+    if of_sweep.asked_for(files, each):
+        of_sweep.report(files[0], as_json, folder, each, force)
+        return
     kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
     runs, tests, bodies = [], [], []

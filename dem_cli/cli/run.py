@@ -32,14 +32,17 @@ def command(
     target = output or Path(scenario.with_suffix(".h5").name)
     check_target(target, force=force)
 
-    from dem_cli.cli.progress import clock, progress_of
+    from dem_cli.cli.progress import Progress
     from dem_cli.jit import is_cold
+    from dem_cli.pace import clock
     from dem_cli.run import run_scenario
 
     began = time.monotonic()
-    with progress_of(loaded, settings.verbosity) as progress:
+    with Progress(loaded, settings.verbosity) as progress:
         what = "bodies" if loaded.engine == "impulse" else "grains"
         progress.say(f"{loaded.title}: {loaded.grain_count} {what}, {len(loaded.stages)} stages, to {target}")
+        if loaded.sweep:
+            progress.say("its table [sweep] is left aside: dem sweep runs that")
         if is_cold():
             progress.say("compiling the kernels, once after installation: up to a minute")
         try:

@@ -64,7 +64,7 @@ class BodyFrameWriter:
         once: Arrays = {name: (getattr(bodies, name),) for name in FIXED}
         xyz = Column("m", "centre of mass", "f8", 3)
         self._data = PolyData(file, len(bodies), BODY_POINT_DATA, BODY_CELL_DATA, xyz, once)
-        self._table = Table(file.create_group("frames"), BODY_FRAMES, IMPULSE.axis)
+        self._table = Table(file.require_group("frames"), BODY_FRAMES, IMPULSE.axis)
 
     def size(self, frame: BodyFrame) -> int:
         """Bytes that a frame takes, to within a few percent."""

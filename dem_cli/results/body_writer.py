@@ -19,7 +19,8 @@ class ImpulseWriter(RunFile):
     """Writes one result file of the impulse engine; a context manager (`run_file.RunFile`).
 
     scene: bodies at the start, and what does not move. gravity (3,) [m/s^2] in the container's axes. container: width (x), breadth (y) and
-    height (z) [m], each None or absent where there is none. tracks: numbers of the bodies to follow.
+    height (z) [m], each None or absent where there is none. tracks: numbers of the bodies to follow. base,
+    preparation: as in ResultWriter.
     """
 
     _frames: BodyFrameWriter
@@ -39,8 +40,10 @@ class ImpulseWriter(RunFile):
         tracks: Ints | None,
         engine: str = "impulse",
         force: bool = False,
+        base: Path | None = None,
+        preparation: str = "",
     ) -> None:
-        super().__init__(path, engine=engine, tracks=tracks, force=force)
+        super().__init__(path, engine=engine, tracks=tracks, force=force, base=base)
         attributes: dict[str, Any] = {
             "title": title,
             "scenario": scenario_text,
@@ -48,6 +51,7 @@ class ImpulseWriter(RunFile):
             "scenario_hash": scenario_hash,
             "seed": seed,
             "engine": engine,
+            **({"preparation": preparation} if preparation else {}),
             "grains": len(scene.bodies),
             "gravity": np.asarray(gravity, dtype=np.float64),
         }

@@ -15,9 +15,10 @@ def create_bonds(file: Any, bonds: Bonds) -> Table | None:
     """The table of strains, to be appended to at every frame; None, and no group, where there are no bonds."""
     if len(bonds) == 0:
         return None
-    group = file.create_group("bonds")
+    begun = "bonds" in file
+    group = file.require_group("bonds")
     axis = make_scale(group, "bond", np.arange(len(bonds)), "1", "number of the bond")
-    for name, (unit, definition) in BONDS.items():
+    for name, (unit, definition) in () if begun else BONDS.items():
         dataset = group.create_dataset(name, data=getattr(bonds, name))
         describe(dataset, unit, definition)
         dataset.dims[0].attach_scale(axis)

@@ -32,7 +32,7 @@ def create_dissipation(file: Any, layout: Layout) -> Table | None:
     """The table, to be appended to with every row of the series; None, and no group, where nothing of the kind is kept."""
     if not layout.dissipation:
         return None
-    group = file.create_group("dissipation")
+    group = file.require_group("dissipation")
     rank = make_scale(group, "rank", np.arange(1, RANKS + 1), "1", "1 is the contact that dissipates most")
     return Table(group, DISSIPATION, layout.axis, rank, whole=("i", "j"))
 

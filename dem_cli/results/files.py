@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +37,17 @@ def check_target(path: Path | str, *, force: bool) -> None:
         raise ResultsError(f"{partial}: left by an unfinished run, or one still going on; --force replaces it")
 
 
-def create_file(partial: Path) -> Any:
-    """A new file that stays readable whatever happens to this process.
+def create_file(partial: Path, base: Path | None = None) -> Any:
+    """A new file that stays readable whatever happens to this process; with the content of `base`, a complete result file, if one is given.
 
     Superblock 0 has no mark "open for writing" that would lock out readers after a kill, there are no file locks, and
     metadata reach the file only in a flush, not whenever HDF5's cache is full.
     """
     try:
         partial.unlink(missing_ok=True)  # not truncated: a run still writing to the old file keeps its own
-        file = h5py.File(partial, "x", libver=("earliest", "v110"), locking=False, rdcc_nbytes=2**20)
+        if base is not None:
+            shutil.copyfile(base, partial)
+        file = h5py.File(partial, "r+" if base else "x", libver=("earliest", "v110"), locking=False, rdcc_nbytes=2**20)
     except OSError as error:
         raise ResultsError(f"{partial}: cannot be written ({cause(error)})") from error
     config = file.id.get_mdc_config()

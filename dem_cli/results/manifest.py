@@ -101,14 +101,14 @@ def read_manifest(path: Path | str) -> Manifest:
             title=str(raw["title"]),
             scenario=str(raw["scenario"]),
             axes=tuple(
-                SweepAxis(tuple(axis["keys"]), tuple(tuple(point) for point in axis["points"]), axis["kind"])
+                SweepAxis(tuple(axis["values"]), tuple(zip(*axis["values"].values(), strict=True)), axis["kind"])
                 for axis in raw.get("axis", [])
             ),
             members=tuple(Member(**member) for member in raw.get("member", [])),
             former=tuple(raw.get("former", [])),
             folder=file.parent,
         )
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ResultsError(f"{file}: is damaged ({error}). Move it away and run dem sweep again") from None
 
 
@@ -121,7 +121,7 @@ def write_manifest(manifest: Manifest) -> None:
         "scenario": manifest.scenario,
         **({"former": list(manifest.former)} if manifest.former else {}),
         "axis": [
-            {"keys": list(axis.keys), "kind": axis.kind, "points": [list(point) for point in axis.points]}
+            {"kind": axis.kind, "values": {key: [point[k] for point in axis.points] for k, key in enumerate(axis.keys)}}
             for axis in manifest.axes
         ],
         "member": [_of_member(member) for member in manifest.members],

@@ -22,7 +22,7 @@ Arrays = dict[str, tuple[npt.NDArray[Any], ...]]
 
 
 class PolyData:
-    """Appends steps to /VTKHDF of an open file; `commit` makes them visible to readers of the format.
+    """Appends steps to /VTKHDF of an open file, after those that it has; `commit` makes them visible to readers of the format.
 
     n: number of vertices, the first points of every step. point_data, cell_data: columns of the schema; xyz: that of the points.
     once: values of the static columns of the points, (n,) or (n, width) a part.
@@ -38,14 +38,12 @@ class PolyData:
         once: Arrays,
     ) -> None:
         self.n = n
-        self.steps = 0
         self._point_columns, self._cell_columns = point_data, cell_data
         # A quarter of the elements a chunk: small enough that the empty part of contact data falls into chunks never written.
         self._chunk = int(2 ** np.clip(np.ceil(np.log2(max(1, n) / 4)), 8, 16))
-        self._points = self._cells = self._lines = 0
         self._spare: list[Rows] = []
         self._pending: list[dict[str, Any]] = []
-        self._root = file.create_group("VTKHDF")
+        self._root = file.require_group("VTKHDF")
         self._root.attrs["Version"] = np.array([2, 0])
         self._root.attrs.create("Type", np.bytes_("PolyData"))
         self._step_data = self._create_steps()
@@ -54,8 +52,14 @@ class PolyData:
         self._cell_data = self._create_columns("CellData", cell_data)
         self._xyz_column, self._xyz = xyz, self._rows(self._root, "Points", xyz)
         self._once = once
+        self.steps = self._step_data["times"].rows
+        self._points = self._xyz.rows
+        self._lines = self._connectivity.rows // 2
+        self._cells = n * self.steps + self._lines
 
     def _column(self, group: Any, name: str, column: Column) -> Any:
+        if name in group:
+            return group[name]
         wide = column.width > 1
         inner = (column.width,) if wide else ()
         each = (1 if column.stored else column.width,) if wide else ()
@@ -77,6 +81,8 @@ class PolyData:
 
     def _per_step(self, group: Any, name: str, links: Sequence[str] = (), dtype: str = "i8", width: int = 0) -> Rows:
         """One row a step. `links`: paths under /VTKHDF that always hold the same numbers and are the same dataset."""
+        if name in group:
+            return Rows(group[name])
         inner = (width,) if width else ()
         dataset = group.create_dataset(
             name, (0, *inner), dtype, maxshape=(None, *inner), chunks=(ROWS_PER_CHUNK, *inner)
@@ -86,8 +92,9 @@ class PolyData:
         return Rows(dataset)
 
     def _create_steps(self) -> dict[str, Rows]:
-        root, steps = self._root, self._root.create_group("Steps")
-        steps.attrs["NSteps"] = 0
+        root, steps = self._root, self._root.require_group("Steps")
+        if "NSteps" not in steps.attrs:
+            steps.attrs["NSteps"] = 0
         moving = [f"Steps/PointDataOffsets/{name}" for name, column in self._point_columns.items() if not column.static]
         fixed = [f"Steps/PointDataOffsets/{name}" for name, column in self._point_columns.items() if column.static]
         cells = [f"Steps/CellDataOffsets/{name}" for name in self._cell_columns]
@@ -113,7 +120,7 @@ class PolyData:
         index = Column("1", "number of a point", "i4")
         offset = Column("1", "start of a cell in Connectivity", "i4")
         vertices = Rows(self._column(root, "Vertices/Connectivity", index))
-        vertices.append(np.arange(self.n))
+        vertices.put(0, np.arange(self.n))
         self._connectivity = self._rows(root, "Lines/Connectivity", index)
         self._vertex_offsets = self._rows(root, "Vertices/Offsets", offset)
         self._line_offsets = self._rows(root, "Lines/Offsets", offset)
@@ -121,7 +128,7 @@ class PolyData:
             self._column(root, f"{name}/Connectivity", index._replace(dtype="i8"))  # as its Offsets
 
     def _create_columns(self, name: str, columns: Mapping[str, Column]) -> dict[str, Rows]:
-        group = self._root.create_group(name)
+        group = self._root.require_group(name)
         return {column: self._rows(group, column, columns[column]) for column in columns}
 
     def append(

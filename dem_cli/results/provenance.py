@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import subprocess
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
@@ -21,6 +23,16 @@ def provenance() -> dict[str, str]:
         **found,
         "platform": platform.platform(),
     }
+
+
+@cache
+def program_identity() -> str:
+    """Version and a digest of the package's sources: two installations with the same one give the same results of the same libraries."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        digest.update(source.relative_to(package).as_posix().encode() + source.read_bytes())
+    return f"dem-cli {__version__} ({digest.hexdigest()[:10]})"
 
 
 def _version(package: str) -> str:

@@ -27,6 +27,15 @@ from dem_cli.state import Floats, Ints
 
 FLUSH_BYTES = 4_000_000
 FLUSH_SECONDS = 1.0
+OF_THE_START = (
+    "grains",
+    "elements",
+    "boundary",
+    "depth",
+    "width",
+    "breadth",
+    "height",
+)  # attributes that a run that goes on keeps
 
 
 class Part(Protocol):
@@ -50,6 +59,8 @@ class RunFile:
     Raises ResultsError before anything is written if path or its partial file exists and `force` is not given, or if the file
     cannot be made; RunError if a write fails later.
 
+    base: a complete file of the same grains and engine that this one goes on from, e.g. of the first stages; its wall time counts too.
+
     The engine's name decides what is in the file (`layouts.layout_of`). A subclass makes its own groups in `_create_groups`, which it hands to
     `_begin`.
     """
@@ -61,7 +72,9 @@ class RunFile:
     _stages: StageTable
     _warnings: Any
 
-    def __init__(self, path: Path | str, *, engine: str, tracks: Ints | None, force: bool) -> None:
+    def __init__(
+        self, path: Path | str, *, engine: str, tracks: Ints | None, force: bool, base: Path | None = None
+    ) -> None:
         self.path = Path(path)
         self._open = False
         self._finished = False
@@ -73,8 +86,10 @@ class RunFile:
         self._bytes = 0
         self._track_ids = None if tracks is None or len(tracks) == 0 else np.asarray(tracks, dtype=np.int64)
         self._parts: list[Part] = []
-        self._file = create_file(self._partial)
+        self._file = create_file(self._partial, base)
         self._open = True
+        self._goes_on = base is not None
+        self._before = float(self._file.attrs.get("wall_time", 0.0))
 
     def _begin(self, attributes: Mapping[str, Any], create: Callable[[], Sequence[Part | None]]) -> None:
         """Write the attributes of the root, and the groups, by `create`, which returns the parts that keep rows back."""
@@ -85,15 +100,17 @@ class RunFile:
             **provenance(),
             **attributes,
             "started": datetime.now(UTC).isoformat(timespec="seconds"),
-            "wall_time": 0.0,
+            "wall_time": self._before,
             "stop_reason": "",
             "complete": 0,
         }
         try:
             with self._guard():
                 for name, value in root.items():
-                    self._file.attrs[name] = value
+                    if not (self._goes_on and name in OF_THE_START):
+                        self._file.attrs[name] = value
                 self._parts = [part for part in create() if part is not None]
+                self._rows = self._series.rows
                 self.flush()
         except RunError as error:
             self._partial.unlink(missing_ok=True)
@@ -105,13 +122,13 @@ class RunFile:
         return self._partial if not self._finished else self.path
 
     def _create_series(self) -> Table:
-        return Table(self._file.create_group("series"), self._layout.series, self._layout.axis)
+        return Table(self._file.require_group("series"), self._layout.series, self._layout.axis)
 
     def _create_tracks(self, definition: str) -> Table | None:
         """definition: whose number it is."""
         if self._track_ids is None:
             return None
-        group = self._file.create_group("tracks")
+        group = self._file.require_group("tracks")
         across = make_scale(group, "grain", self._track_ids, "1", definition)
         return Table(group, self._layout.tracks, self._layout.axis, across)
 
@@ -119,6 +136,8 @@ class RunFile:
         return StageTable(self._file, self._layout)
 
     def _create_warnings(self) -> Any:
+        if "warnings" in self._file:
+            return self._file["warnings"]
         return self._file.create_dataset("warnings", (0,), TEXT, maxshape=(None,), chunks=(64,))
 
     def add_motion(self, number: int, acceleration: Floats, facts: Mapping[str, Any]) -> None:
@@ -177,7 +196,7 @@ class RunFile:
             self._need_room(2 * self._bytes)
             for part in self._parts:
                 part.flush()
-            self._file.attrs.modify("wall_time", clock.monotonic() - self._started)
+            self._file.attrs.modify("wall_time", self._before + clock.monotonic() - self._started)
             announce_length(self._file, 2 * self._bytes + SPARE_BYTES)
             self._file.flush()
             for part in self._parts:

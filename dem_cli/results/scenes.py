@@ -14,7 +14,9 @@ _SHAPE_NUMBERS = ("spacing", "mass", "volume", "reach")
 
 
 def create_scene(file: Any, scene: Scene) -> None:
-    """Write all of a scene but its bodies."""
+    """Write all of a scene but its bodies, unless it is there."""
+    if "groups" in file:
+        return
     _names(file.create_group("groups"), scene.groups)
     materials = file.create_group("materials")
     name, other = _names(materials, scene.materials), _names(materials, scene.materials, "other")

@@ -30,7 +30,9 @@ class Stage:
 
 
 class StageTable:
-    """Columns over `stage`; the series row at its start and end as `before` and `after`, shape (stages, quantities)."""
+    """Columns over `stage`; the series row at its start and end as `before` and `after`, shape (stages, quantities). Stages that are in the
+    file, all of them over, are gone on with.
+    """
 
     def __init__(self, file: Any, layout: Layout) -> None:
         self._axis = layout.axis.name
@@ -39,13 +41,20 @@ class StageTable:
         self._last_place = np.nan
         self._needs_row = False
         self._last_row: list[float] | None = None
+        self._columns: dict[str, Any] = {}
+        if "stages" in file:
+            self._group = file["stages"]
+            self._columns = {name: self._group[name] for name in layout.stages}
+            self._stage = int(self._group.attrs["rows"]) - 1
+            self._last_row = self._columns["after"][self._stage].tolist()
+            self._last_place = float(self._columns["end"][self._stage])
+            return
         self._group = group = file.create_group("stages")
         group.attrs["rows"] = 0
         quantity = group.create_dataset("quantity", data=self._measures, dtype=TEXT)
         quantity.make_scale("quantity")
         units = group.create_dataset("units", data=[layout.series[name][0] for name in self._measures], dtype=TEXT)
         units.dims[0].attach_scale(quantity)
-        self._columns: dict[str, Any] = {}
         for name, (unit, definition) in layout.stages.items():
             text, wide = name in ("name", "kind", "reason"), name in ("before", "after")
             inner = (len(self._measures),) if wide else ()

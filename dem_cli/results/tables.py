@@ -44,7 +44,7 @@ class Rows:
         self._spare = spare
         self._extent = len(dataset)
         self._space = self._id.get_space()
-        self.rows = 0  # filled
+        self.rows = self._extent  # filled
 
     def put(self, start: int, values: npt.NDArray[Any], column: int | None = None) -> None:
         """Write `values` from row `start` on: (rows,), (rows, width), or (rows,) into one column of several."""
@@ -85,7 +85,9 @@ def describe(dataset: Any, unit: str, definition: str) -> None:
 
 
 def make_scale(group: Any, name: str, values: Any, unit: str, definition: str) -> Any:
-    """A dimension scale of fixed length: the axis that xarray and netCDF tools look for."""
+    """A dimension scale of fixed length, unless it is there: the axis that xarray and netCDF tools look for."""
+    if name in group:
+        return group[name]
     dataset = group.create_dataset(name, data=values)
     dataset.make_scale(name)
     describe(dataset, unit, definition)
@@ -93,7 +95,8 @@ def make_scale(group: Any, name: str, values: Any, unit: str, definition: str) -
 
 
 class Table:
-    """Named columns over time, or over increments, in one group; each a dataset of shape (rows,) or (rows, len(across)).
+    """Named columns over time, or over increments, in one group; each a dataset of shape (rows,) or (rows, len(across)). A group that has
+    them is gone on with.
 
     columns: name -> (unit, definition); `axis` is a column of its own, made first. across: scale of the second dimension.
     whole: columns of whole numbers.
@@ -112,6 +115,11 @@ class Table:
         self._width = 1 if across is None else len(across)
         self._pending: list[npt.NDArray[np.float64]] = []
         self._places: list[float] = []
+        self._attrs = group.attrs
+        if axis.name in group:
+            self._scale = Rows(group[axis.name])
+            self._columns = [Rows(group[name]) for name in self.names]
+            return
         scale = group.create_dataset(axis.name, (0,), "f8", maxshape=(None,), chunks=(ROWS_PER_CHUNK,))
         scale.make_scale(axis.name)
         describe(scale, axis.unit, axis.definition)
@@ -119,7 +127,6 @@ class Table:
             self._column(group, name, *columns[name], scale, "i4" if name in whole else "f8") for name in self.names
         ]
         self._scale = Rows(scale)
-        self._attrs = group.attrs
         self._attrs["rows"] = 0
 
     def _column(self, group: Any, name: str, unit: str, definition: str, scale: Any, dtype: str) -> Rows:
@@ -142,6 +149,11 @@ class Table:
         self._pending.append(row)
         self._places.append(float(place))
         return row.nbytes
+
+    @property
+    def rows(self) -> int:
+        """Rows handed to HDF5."""
+        return self._scale.rows
 
     def flush(self) -> None:
         """Hand the kept rows to HDF5."""

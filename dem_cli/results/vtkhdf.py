@@ -48,7 +48,7 @@ class FrameWriter:
         columns = {**POINT_DATA, **({"shape": TURNING_SHAPE} if self._turning else {})}
         self._data = PolyData(file, self._n, columns, CELL_DATA, Column("m", "position", "f8", 3, (0, 1)), once)
         self._strain = create_bonds(file, bonds)
-        self._table = Table(file.create_group("frames"), layout.frames, layout.axis)
+        self._table = Table(file.require_group("frames"), layout.frames, layout.axis)
 
     def size(self, frame: Frame | Increment) -> int:
         """Bytes that a frame takes, to within a few percent."""

@@ -13,7 +13,9 @@ ENDS = ("x0", "y0", "x1", "y1")
 
 
 def create_walls(file: Any, walls: Walls) -> None:
-    """/walls over `name`: where they are at the start of the run, and their friction."""
+    """/walls over `name`, unless they are there: where they are at the start of the run, and their friction."""
+    if "walls" in file:
+        return
     group = file.create_group("walls")
     name = group.create_dataset("name", data=list(walls.name), dtype=TEXT, shape=(len(walls),))
     name.make_scale("name")

@@ -24,7 +24,7 @@ class ResultWriter(RunFile):
 
     container: width and height [m]; height None or absent for walls without end. tracks: numbers of the grains (not elements) to
     follow. surface_x: centres of the bins of the free surface [m]. bonds: None where there are none. boundary: number of boundary grains, the
-    last of the elements.
+    last of the elements. base: see RunFile; preparation: what made it is called.
     """
 
     _frames: FrameWriter
@@ -48,10 +48,12 @@ class ResultWriter(RunFile):
         bonds: Bonds | None = None,
         boundary: int = 0,
         force: bool = False,
+        base: Path | None = None,
+        preparation: str = "",
     ) -> None:
         if (surface_x is None) == layout_of(engine).surface:
             raise ValueError("a run over time needs the bins of its free surface, and no other run has them")
-        super().__init__(path, engine=engine, tracks=tracks, force=force)
+        super().__init__(path, engine=engine, tracks=tracks, force=force, base=base)
         attributes = {
             "title": title,
             "scenario": scenario_text,
@@ -59,6 +61,7 @@ class ResultWriter(RunFile):
             "scenario_hash": scenario_hash,
             "seed": seed,
             "engine": engine,
+            **({"preparation": preparation} if preparation else {}),
             "grains": grains.grain_count,
             "elements": len(grains),
             "depth": depth,
@@ -85,7 +88,7 @@ class ResultWriter(RunFile):
     def _create_surface(self, x: Floats | None) -> Table | None:
         if x is None:
             return None
-        group = self._file.create_group("surface")
+        group = self._file.require_group("surface")
         unit, definition = SURFACE["x"]
         across = make_scale(group, "x", np.asarray(x, dtype=np.float64), unit, definition)
         return Table(group, {"eta": SURFACE["eta"]}, self._layout.axis, across)

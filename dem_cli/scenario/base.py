@@ -15,6 +15,7 @@ from dem_cli.scenario.grain_file import GrainFile, read_grain_file
 from dem_cli.scenario.packing import Packing
 from dem_cli.scenario.quantities import Length, Whole
 from dem_cli.scenario.stored_grains import is_result_file
+from dem_cli.scenario.sweep import Sweep
 from dem_cli.scenario.table import Given, Mistake, Table, key
 from dem_cli.scenario.tables import Followed, Grains, Material
 
@@ -31,6 +32,7 @@ class AnyScenario(Table):
     _source: str = PrivateAttr(default="")
     _path: Path | None = PrivateAttr(default=None)
     _folder: Path = PrivateAttr(default=Path())
+    _sweep: Sweep | None = PrivateAttr(default=None)
 
     # Stages of the engine, by kind.
     stage_kinds: ClassVar[Mapping[str, type[Table]]] = {}
@@ -53,6 +55,16 @@ class AnyScenario(Table):
     def path(self) -> Path | None:
         """The scenario's file, if it came from one."""
         return self._path
+
+    @property
+    def folder(self) -> Path:
+        """Where the paths of files in the scenario start."""
+        return self._folder
+
+    @property
+    def sweep(self) -> Sweep | None:
+        """The file's table [sweep], which is no part of the run itself."""
+        return self._sweep
 
     @property
     def origin(self) -> str:

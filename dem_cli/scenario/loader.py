@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from dem_cli import units
-from dem_cli.errors import ScenarioError
+from dem_cli.errors import OverrideError, ScenarioError
 from dem_cli.scenario import mistakes
 from dem_cli.scenario.base import AnyScenario, DiscScenario, tracked_exist
 from dem_cli.scenario.engines import EngineScenario, engine_of, missing_engine, stages_of, unknown_engine
@@ -24,6 +24,7 @@ from dem_cli.scenario.quasi_static import QuasiStaticScenario, unprepared
 from dem_cli.scenario.raw_record import RecordError
 from dem_cli.scenario.stages import Shake
 from dem_cli.scenario.stored_grains import StoredGrains, is_result_file, read_stored_grains
+from dem_cli.scenario.sweep import Sweep
 from dem_cli.scenario.table import NOTHING, value_at
 
 Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, rule, remedy
@@ -32,8 +33,15 @@ Found = tuple[tuple[str | int, ...], Any, str, str]  # a mistake: place, value, 
 def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> EngineScenario:
     """The scenario of a TOML file, changed by `overrides` ("contact.friction=0.3"). ScenarioError holds a line per mistake."""
     path = Path(path)
+    scenario = parse_scenario(read_text(path), origin=str(path), folder=path.parent, overrides=overrides)
+    scenario._path = path
+    return scenario
+
+
+def read_text(path: Path) -> str:
+    """The text of a scenario file. ScenarioError if it cannot be read."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise ScenarioError(f"{path}: does not exist. List the scenarios that come along with: dem init") from None
     except IsADirectoryError:
@@ -42,21 +50,24 @@ def load_scenario(path: str | Path, overrides: Iterable[str] = ()) -> EngineScen
         raise ScenarioError(f"{path}: is not text in UTF-8. Save it in this encoding") from None
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read ({error.strerror}). Check the path and its permissions") from None
-    scenario = parse_scenario(text, origin=str(path), folder=path.parent, overrides=overrides)
-    scenario._path = path
-    return scenario
 
 
 def parse_scenario(
     text: str, origin: str = "<text>", folder: str | Path = ".", overrides: Iterable[str] = ()
 ) -> EngineScenario:
     """The scenario that `text` holds. origin: its name in messages. folder: where paths in it start."""
-    try:
-        raw = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(mistakes.syntax(origin, text, error)) from None
+    raw = read_toml(text, origin)
     folder = Path(folder)
+    sweep, in_sweep = read_sweep(raw)
     lines = apply_overrides(raw, overrides)
+    refused = bool(lines)
+    lines += [mistakes.line(origin, *one, raw) for one in in_sweep]
+    if sweep and sweep.scenarios:
+        rule = "sweeps other files, and is no scenario of its own"
+        lines.append(
+            mistakes.line(origin, ("sweep", "scenarios"), list(sweep.scenarios), rule, "Run it with dem sweep", raw)
+        )
+        raise ScenarioError("\n".join(lines))
     kind, missing = engine_of(raw), missing_engine(raw)
     if kind is None or missing:
         loc, rule, remedy = missing or unknown_engine(raw)
@@ -86,10 +97,33 @@ def parse_scenario(
     lines += [mistakes.line(origin, *one, raw) for one in found]
     lines += [mistakes.line(origin, *one, raw) for one in from_file]
     if lines or scenario is None:
-        raise ScenarioError("\n".join(dict.fromkeys(lines)))
-    scenario._source = text
+        raise (OverrideError if refused else ScenarioError)("\n".join(dict.fromkeys(lines)))
+    scenario._source, scenario._sweep = text, sweep
     scenario._folder = folder
     return scenario
+
+
+def read_toml(text: str, origin: str) -> dict[str, Any]:
+    """The data that TOML text holds. ScenarioError, with advice, if it is none."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(mistakes.syntax(origin, text, error)) from None
+
+
+def read_sweep(raw: dict[str, Any]) -> tuple[Sweep | None, list[Found]]:
+    """Takes the table [sweep] out of TOML data, with its mistakes: it belongs to no run."""
+    if "sweep" not in raw:
+        return None, []
+    table = raw.pop("sweep")
+    try:
+        return Sweep.model_validate(table), []
+    except ValidationError as error:
+        found = [
+            (("sweep", *one["loc"]), one["input"], one["ctx"]["rule"], one["ctx"]["remedy"])
+            for one in error.errors(include_url=False)
+        ]
+        return None, found
 
 
 def _width_of_file(raw: dict[str, Any], folder: Path, kind: type[AnyScenario]) -> None:

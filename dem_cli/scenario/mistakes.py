@@ -56,6 +56,7 @@ TABLES = (
     "solver",
     "output",
     "terrain",
+    "sweep",
 )
 
 

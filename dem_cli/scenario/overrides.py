@@ -48,7 +48,7 @@ def _apply(raw: dict[str, Any], override: str) -> None:
     parts = [p.strip() for p in path.split(".")]
     if not sign or not all(parts):
         raise _RefusedError("is not KEY=VALUE", "Write for example --set contact.friction=0.3")
-    value = _value(text.strip())
+    value = read_value(text.strip())
     if parts[0] == "stage" and len(parts) > 1:
         for stage in _stages(raw, parts):
             rest = parts[2:] if _is_selector(raw, parts[1]) else parts[1:]
@@ -84,7 +84,8 @@ def _set_listed(raw: dict[str, Any], parts: list[str], value: Any) -> None:
         _set(BodyKind if name == "grains" else Plane, listed[k], rest, value, before)
 
 
-def _value(text: str) -> Any:
+def read_value(text: str) -> Any:
+    """A value as it stands on the command line: TOML where that works, else text."""
     try:
         data = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:

@@ -14,6 +14,7 @@ from dem_cli.scenario.base import AnyScenario
 from dem_cli.scenario.engines import ENGINES
 from dem_cli.scenario.model import Scenario
 from dem_cli.scenario.quantities import FrictionNumber, Number, Quantity, Range, Whole
+from dem_cli.scenario.sweep import Seeds, Sweep, Varied
 from dem_cli.scenario.table import Table, toml_text
 
 # Tables that stand before the stages in the part of their engine.
@@ -23,16 +24,27 @@ HEAD = "| key | value | default | meaning |\n|---|---|---|---|\n"
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema (draft 2020-12) of scenario files: one of the engines' schemas, as `engine` says."""
-    tables: dict[str, Any] = {}
+    sweep = _tidy(Sweep.model_json_schema(by_alias=True, mode="validation"))
+    of_files = {
+        "type": "object",
+        "description": "A sweep of other files.",
+        "properties": {"title": {"type": "string"}, "sweep": {**sweep, "required": ["scenarios"]}},
+        "required": ["sweep"],
+        "additionalProperties": False,
+    }
+    tables: dict[str, Any] = {"Sweep": sweep, "SweepOfFiles": of_files}
     for scenario in ENGINES.values():
         schema = _tidy(scenario.model_json_schema(by_alias=True, mode="validation"))
+        schema["properties"]["sweep"] = {"$ref": "#/$defs/Sweep"}
         for name, table in (*schema.pop("$defs").items(), (scenario.__name__, schema)):
             assert tables.setdefault(name, table) == table, f"two tables are called {name}"
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "dem-cli scenario",
         "description": "A scenario of dem-cli. Values with a dimension are strings with their unit.",
-        "oneOf": [{"$ref": f"#/$defs/{scenario.__name__}"} for scenario in ENGINES.values()],
+        "oneOf": [
+            {"$ref": f"#/$defs/{name}"} for name in (*(one.__name__ for one in ENGINES.values()), "SweepOfFiles")
+        ],
         "$defs": tables,
     }
 
@@ -67,6 +79,7 @@ def reference_markdown() -> str:
         if (name, table) in shared:
             without = [engine for engine, tables in of_engine.items() if (name, table) not in tables]
             sections.append(_section(f"`{name}`", table, without=without))
+    sections.append(_section("`[sweep]`", Sweep))
     for engine, scenario in ENGINES.items():
         sections.append(f'### Only with `engine = "{engine}"`\n')
         own = [(name, table) for name, table in _tables(scenario) if (name, table) not in shared]
@@ -137,6 +150,9 @@ def _value(field: FieldInfo, inner: type[Table] | None) -> str:
         if typing.get_origin(kind) is typing.Literal
     ]
     bounds = next(_bounds(field), None)
+    own = next((extra.words for extra in field.metadata if isinstance(extra, Varied | Seeds)), None)
+    if own is not None:
+        return _cell(own + example)
     if inner is not None:
         said = "table" if inner.short_form is None else f"{_short(inner)} or table"
     elif isinstance(bounds, Quantity):

@@ -14,7 +14,9 @@ from dem_cli.scenario.base import files_named
 
 @dataclass(frozen=True)
 class Shipped:
-    """A scenario that comes along: its name, title, what its comments say about it, and the files that it reads, by name."""
+    """A scenario that comes along: its name, title, what its comments say about it, and the files that it reads, by name: also scenarios that
+    it sweeps.
+    """
 
     name: str
     title: str
@@ -22,6 +24,11 @@ class Shipped:
     takes: str
     text: str
     files: tuple[str, ...] = ()
+
+    @property
+    def sweeps(self) -> bool:
+        """Whether it is there to be swept."""
+        return "sweep" in tomllib.loads(self.text)
 
 
 def folder() -> Path:
@@ -51,8 +58,10 @@ def shipped_scenario(name: str) -> Shipped:
 def _read(path: Path) -> Shipped:
     text = path.read_text(encoding="utf-8")
     raw = tomllib.loads(text)
-    files = tuple(files_named(raw))
-    return Shipped(path.stem, raw["title"], _comment(text, "Shows"), _comment(text, "Takes"), text, files)
+    files = list(files_named(raw))
+    for name in raw.get("sweep", {}).get("scenarios", []):
+        files += [name, *files_named(tomllib.loads((path.parent / name).read_text(encoding="utf-8")))]
+    return Shipped(path.stem, raw["title"], _comment(text, "Shows"), _comment(text, "Takes"), text, tuple(files))
 
 
 def _comment(text: str, word: str) -> str:

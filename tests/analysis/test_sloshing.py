@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from dem_cli.analysis.sloshing import surface_period, theory_period, thesis_period
+from dem_cli.analysis.sloshing import driven_motion, surface_period, theory_period, thesis_period
 
 G = 9.80665
 RADIUS = 7.5e-3
@@ -142,3 +142,45 @@ def test_uneven_times_and_gaps_are_borne():
     signal[50:53] = np.nan
     found = surface_period(extra, signal, mean_radius=RADIUS)
     assert 1.0 / found.period == pytest.approx(1.2, abs=0.01)
+
+
+@pytest.mark.parametrize("frequency", [0.71, 1.3, 10.0])
+def test_driven_amplitude_of_a_steady_record(frequency):
+    t, signal = record(10.0, (frequency, 0.02, 0.4), (2.0 * frequency, 0.005, 1.0), drift=1e-3, noise=1e-4)
+    found = driven_motion(t, signal, 1.0 / frequency)
+    assert found.reason == ""
+    assert found.amplitude == pytest.approx(0.02, rel=0.02)
+    assert found.rest == pytest.approx(0.005 / math.sqrt(2.0), rel=0.05)
+    assert found.periods == int(5.0 * frequency)
+    assert found.end == pytest.approx(13.0)
+    assert found.start == pytest.approx(13.0 - found.periods / frequency)
+
+
+def test_what_dies_away_in_the_first_half_is_no_steady_motion():
+    t, signal = record(20.0, (1.0, 0.01, 0.0))
+    transient = 0.05 * np.exp(-(t - 3.0) / 1.0) * np.cos(2 * np.pi * 0.9 * t)
+    assert driven_motion(t, signal + transient, 1.0).amplitude == pytest.approx(0.01, rel=1e-3)
+    early = np.where(t < 13.0, 5.0 * signal, signal)
+    assert driven_motion(t, early, 1.0).amplitude == pytest.approx(0.01, rel=0.02)
+
+
+def test_ramps_are_left_out():
+    t, signal = record(20.0, (2.0, 0.01, 0.0))
+    ramp = np.clip(np.minimum(t - 3.0, 23.0 - t) / 4.0, 0.0, 1.0)
+    found = driven_motion(t, 0.002 + (signal - 0.002) * ramp, 0.5, ramp=4.0)
+    assert (found.start, found.end) == (pytest.approx(13.0), pytest.approx(19.0))
+    assert found.amplitude == pytest.approx(0.01, rel=1e-6)
+
+
+def test_another_frequency_is_no_driven_motion():
+    t, signal = record(20.0, (0.74, 0.02, 1.1))
+    assert driven_motion(t, signal, 0.1).amplitude < 1e-4
+
+
+def test_driven_motion_that_cannot_be_told():
+    t, signal = record(2.9, (1.0, 0.02, 0.0))
+    assert "less than 3 driving periods of 1 s" in driven_motion(t, signal, 1.0).reason
+    assert driven_motion(*record(3.0, (1.0, 0.02, 0.0)), 1.0).periods == 2
+    assert "too seldom" in driven_motion(*record(10.0, (8.0, 0.02, 0.0), interval=0.06), 0.125).reason
+    assert "fewer than" in driven_motion(t[:10], signal[:10], 0.01).reason
+    assert math.isnan(driven_motion(t, np.full_like(t, math.nan), 1.0).amplitude)

@@ -14,6 +14,7 @@ from dem_cli.engines.explicit.lists import FINE
 from dem_cli.engines.explicit.state import ExplicitState
 from dem_cli.engines.explicit.timestep import choose_time_step
 from dem_cli.engines.motion import Ground, gravity_of, ground_of
+from dem_cli.engines.pausing import Pausable
 from dem_cli.engines.schedule import Schedule
 from dem_cli.scenario import Run, Scenario, Settle, Shake
 from dem_cli.state import Frame
@@ -22,14 +23,14 @@ QUIET_ROWS = 3  # rows of the series in which a bed must be at rest: one instant
 STEPS_PER_CALL = 4e7  # grain-steps between two chances to interrupt: about a second
 
 
-class ExplicitEngine:
+class ExplicitEngine(Pausable):
     """Runs the stages of a scenario; a generator of frames.
 
     The state that moves is `state` (arrays only), the place in the list of stages is (stage, stage_started).
     """
 
     def __init__(self, scenario: Scenario, assembly: Assembly) -> None:
-        self.scenario = scenario
+        self.scenario, self.assembly = scenario, assembly
         self.time_step, _ = choose_time_step(scenario, assembly)
         self.gravity = gravity_of(scenario)
         self.state = ExplicitState.start_of(scenario, assembly, self.time_step)
@@ -39,16 +40,18 @@ class ExplicitEngine:
         self._watch = Watch()
         self.check: Callable[[], None] = lambda: None  # called about every second of work; may raise KeyboardInterrupt
 
-    def frames(self) -> Iterator[Frame]:
-        """Frames that are due, stage after stage. RunError if the run blows up."""
-        self.state.first_forces()
-        for number, stage in enumerate(self.scenario.stages):
+    def frames(self, until: int | None = None) -> Iterator[Frame]:
+        """Frames that are due, stage after stage, up to stage `until` (from 0), which is not begun. RunError if the run blows up."""
+        if not self.done:
+            self.state.first_forces()
+        for number, stage in enumerate(self.scenario.stages[self.done : until], self.done):
             self.stage = number
             self.stage_started = self.state.time
             ground = ground_of(stage)
             damping = (stage.damping.mass, stage.damping.local) if isinstance(stage, Settle) else (0.0, 0.0)
             yield from self._run_stage(stage, ground, damping)
             self._ground_place = self._ground_place + ground.motion(stage.longest)[0]
+            self.done = number + 1
 
     def _run_stage(self, stage: Settle | Shake | Run, ground: Ground, damping: tuple[float, float]) -> Iterator[Frame]:
         schedule = Schedule(self.scenario.output, self.stage_started, stage.longest)

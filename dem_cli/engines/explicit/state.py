@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from dem_cli.assembly import Assembly
 from dem_cli.engines.explicit import bodies, step
 from dem_cli.engines.explicit.bodies import BOND, Bonded, Cores
-from dem_cli.engines.explicit.build import aligned, bonded_of, chunk_edges, cores_of, outlines_of, sort_bonds
+from dem_cli.engines.explicit.build import aligned, bonded_of, chunk_edges, cores_of, outlines_of, realigned, sort_bonds
 from dem_cli.engines.explicit.ellipses import Outlines, pair_gap, wall_contact
 from dem_cli.engines.explicit.forces import ARC, FX, MOBILITY, RATIO, ROW, Q, R, U, V, X, Y, wall_direction
 from dem_cli.engines.explicit.law import Law, make_law
@@ -121,6 +122,14 @@ class ExplicitState:
             skin=SKIN * float(grains.radius.mean()),
             box=Box(0.0, scenario.container.width, 0.0),
         )
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """As from a file: what begins at a cache line does so again."""
+        vars(self).update(state, rows=realigned(state["rows"]))
+        if self.outlines is not None:
+            self.outlines = self.outlines._replace(fours=realigned(self.outlines.fours))
+        if self.cores is not None:
+            self.cores = self.cores._replace(rows=realigned(self.cores.rows))
 
     # -- motion -----------------------------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from dem_cli.engines.granular_element.controls import ShearControl, is_membrane
 from dem_cli.engines.granular_element.observe import grains_of, slips_of, walls_of
 from dem_cli.engines.granular_element.sample import Sample
 from dem_cli.engines.granular_element.step import Done, Solver, Way, sub_step
+from dem_cli.engines.pausing import Pausable
 from dem_cli.errors import RunError
 from dem_cli.scenario import QuasiStaticScenario
 from dem_cli.state import Floats, Increment, QuasiStaticEnergy
@@ -53,7 +54,7 @@ def amiss_at_first(start: Increment) -> tuple[str, ...]:
     )
 
 
-class Apparatus:
+class Apparatus(Pausable):
     """The sample, moved and observed. `place` is all that moves; stage, in_stage, number: where the run is."""
 
     def __init__(self, scenario: QuasiStaticScenario, assembly: Assembly) -> None:
@@ -62,6 +63,7 @@ class Apparatus:
         self.place = Place(build_sample(scenario, assembly))
         self.check: Callable[[], None] = lambda: None  # called between sub-steps; may raise KeyboardInterrupt
         self.stage = self.in_stage = self.number = 0
+        self.ends: dict[str, Place] = {}  # of the stages that are over, from which later ones may branch
         self.works: deque[float] = deque(maxlen=USUAL)
         self.way: Way | None = None
         self.first_stress = 0.0

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from dem_cli.engines.granular_element.apparatus import Apparatus, Place, amiss_at_first
+from dem_cli.engines.granular_element.apparatus import Apparatus, amiss_at_first
 from dem_cli.engines.granular_element.boundary import Servos
 from dem_cli.engines.granular_element.chains import release
 from dem_cli.engines.granular_element.controls import (
@@ -34,15 +34,16 @@ TINY = 1e-9
 class GranularElementEngine(Apparatus):
     """Runs the stages of a scenario; a generator of increments."""
 
-    def increments(self) -> Iterator[Increment]:
-        """Increments, stage after stage; each begins with the state that it starts from. RunError where a control cannot be met."""
-        ends: dict[str, Place] = {}
-        branched = {stage.branch for stage in self.scenario.stages if stage.branch}
-        self._push_apart()
-        for number, stage in enumerate(self.scenario.stages):
+    def increments(self, until: int | None = None) -> Iterator[Increment]:
+        """Increments, stage after stage, up to stage `until` (from 0), which is not begun; each stage begins with the state that it starts from.
+        RunError where a control cannot be met.
+        """
+        if not self.done:
+            self._push_apart()
+        for number, stage in enumerate(self.scenario.stages[self.done : until], self.done):
             self.stage, self.in_stage = number, 0
             if stage.branch:
-                self.place = ends[stage.branch].copy()
+                self.place = self.ends[stage.branch].copy()
             self.works.clear()
             self.way = None
             if not isinstance(stage, Compress) and math.isnan(self.place.width):
@@ -63,8 +64,8 @@ class GranularElementEngine(Apparatus):
                     yield from self._cycle(stage)
             except NotFiniteError as error:
                 raise RunError(f"{self.where}: the force on grain {error.args[0]} is not a finite number") from error
-            if stage.name in branched:
-                ends[stage.name] = self.place.copy()
+            self.ends[stage.name] = self.place.copy()
+            self.done = number + 1
 
     def _push_apart(self) -> None:
         """Overlapping packings: grains are pushed apart without friction in the box as it is; what that takes is in no ledger."""

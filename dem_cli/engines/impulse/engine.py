@@ -12,6 +12,7 @@ from dem_cli.engines.impulse.state import WHOLE, ImpulseState
 from dem_cli.engines.impulse.step import WORK
 from dem_cli.engines.impulse.timestep import choose_time_step, coarse
 from dem_cli.engines.motion import Ground, ground_of
+from dem_cli.engines.pausing import Pausable
 from dem_cli.engines.schedule import Schedule
 from dem_cli.errors import RunError, ScenarioError
 from dem_cli.rigid import BodyFrame, Scene
@@ -23,7 +24,7 @@ LEFT = 1e-3  # penetration over the smaller reach that a run may leave, and that
 SEPARATING = 1000  # rounds in which overlapping bodies are moved apart at the start
 
 
-class ImpulseEngine:
+class ImpulseEngine(Pausable):
     """Runs the stages of a scenario; a generator of frames."""
 
     def __init__(self, scenario: ImpulseScenario, scene: Scene) -> None:
@@ -73,13 +74,14 @@ class ImpulseEngine:
             return planes.name[wall]
         return self.scene.terrain.name if self.scene.terrain else "the terrain"
 
-    def frames(self) -> Iterator[BodyFrame]:
-        """Frames that are due, stage after stage. RunError if the run blows up."""
-        for number, stage in enumerate(self.scenario.stages):
+    def frames(self, until: int | None = None) -> Iterator[BodyFrame]:
+        """Frames that are due, stage after stage, up to stage `until` (from 0), which is not begun. RunError if the run blows up."""
+        for number, stage in enumerate(self.scenario.stages[self.done : until], self.done):
             self.stage, self.stage_started = number, self.state.time
             ground, turn = ground_of(stage), _directions(stage)
             yield from self._run_stage(stage, ground, turn)
             self._ground_place = self._ground_place + ground.motion(stage.longest)[0] @ turn
+            self.done = number + 1
 
     def _run_stage(
         self, stage: ImpulseSettle | ImpulseShake | Run, ground: Ground, turn: Floats

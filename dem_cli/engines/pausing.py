@@ -1,0 +1,57 @@
+"""What lets an engine stop between two stages and go on later, in another process or as several runs: its state as bytes."""
+
+from __future__ import annotations
+
+import io
+import pickle
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from dem_cli.errors import ResultsError
+
+FROM_NUMPY = {"_reconstruct", "ndarray", "dtype", "scalar", "_frombuffer"}
+FROM_ELSEWHERE = {("collections", "deque"), ("builtins", "frozenset"), ("builtins", "set")}
+
+
+class Pausable:
+    """An engine whose first `done` stages are over. All that it is goes into its bytes but the scenario, whose stages to come may differ."""
+
+    check: Callable[[], None]
+    done: int = 0  # stages that are over
+
+    _left_out: ClassVar = ("scenario", "check")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name not in self._left_out}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, check=lambda: None)
+
+    def freeze(self) -> bytes:
+        """The engine between two stages, so that `thaw` gives one that goes on with the same bits."""
+        return pickle.dumps(self, protocol=5)
+
+
+class _Reader(pickle.Unpickler):
+    """Reads arrays and the classes of this program; nothing that a strange file might want to call."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        found = super().find_class(module, name) if module.split(".")[0] in ("dem_cli", "numpy") else None
+        own = module.startswith("dem_cli.") and isinstance(found, type)
+        if own or (module.startswith("numpy") and name in FROM_NUMPY):
+            return found
+        if (module, name) in FROM_ELSEWHERE:
+            return super().find_class(module, name)
+        raise pickle.UnpicklingError(f"{module}.{name} does not belong to the state of an engine")
+
+
+def thaw(data: bytes, scenario: Any) -> Any:
+    """The engine that `data` (of `freeze`) holds, to go on with `scenario`. ResultsError if they hold none."""
+    try:
+        engine = _Reader(io.BytesIO(data)).load()
+    except Exception as error:  # whatever a damaged file makes of itself
+        raise ResultsError(f"the state of the preparation cannot be read ({error})") from error
+    if not isinstance(engine, Pausable):
+        raise ResultsError("the state of the preparation is none of an engine")
+    vars(engine)["scenario"] = scenario
+    return engine
