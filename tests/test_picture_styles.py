@@ -202,3 +202,21 @@ def test_long_names_are_folded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         "packed (ring) and after shaking (dot)"
         in CliRunner().invoke(compare, [*map(str, files), "--style", "paper", "-o", str(tmp_path / "again.svg")]).stderr
     )
+
+
+@pytest.mark.parametrize("name", STYLES)
+def test_sweeps_too(tmp_path: Path, name: str) -> None:
+    import sweep_samples
+
+    folder = sweep_samples.make_sweep(tmp_path / "sweep")
+    result = CliRunner().invoke(render, [str(folder), "--what", "resonance", "--style", name, "--dpi", "100"])
+    assert result.exit_code == 0, result.exception
+    from dem_cli.report import sweep_figures
+    from dem_cli.report.sweep import read_sweep
+
+    found = read_sweep(folder)
+    for kind in sweep_figures.KINDS:
+        with style(name):
+            _, _, figure = sweep_figures.draw(found, kind)
+            assert clashes(figure) == []
+            assert name == "screen" or figure.get_size_inches()[0] == pytest.approx(WIDTH[name])
