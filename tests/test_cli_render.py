@@ -123,7 +123,7 @@ def test_help_is_light_and_lists_everything() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    words = re.findall(r"\w+", done.stdout)
+    words = re.findall(r"[\w-]+", done.stdout)
     assert set(KINDS) <= set(words)
     assert set(QUANTITIES) <= set(words)
 

@@ -56,3 +56,13 @@ def test_notebook_example_runs(tmp_path, monkeypatch):
     with names["results"] as results:
         assert results.complete
         assert results.stages[-1].kind == "shake"
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    three = re.search(r"Three lines to a labelled plot.*?```python\n(.*?)```", README, re.DOTALL)
+    assert three
+    exec(compile(three.group(1), "README", "exec"), names)
+    drawn = re.findall(r"`(run\.to_xarray\(.*?)`", README)
+    assert len(drawn) == 2
+    for line in drawn:
+        assert eval(line, names) is not None
+    with names["run"] as run:
+        assert run.to_xarray("grains", frames=-1).sizes["grain"] == 500

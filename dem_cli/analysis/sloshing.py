@@ -30,7 +30,7 @@ _SIDELOBE = 1 / 300
 """
 
 _PADDING = 8
-_LEAST_SAMPLES = 16
+LEAST_SAMPLES = 16
 
 
 def theory_period(mode: int, width: float, depth: float, gravity: float) -> float:
@@ -93,12 +93,10 @@ def surface_period(
     """
     finite = np.isfinite(mode)
     time, mode = time[finite], mode[finite]
-    if len(time) < _LEAST_SAMPLES:
-        return SurfacePeriod(reason=f"fewer than {_LEAST_SAMPLES} samples of the surface")
-    length = float(time[-1] - time[0])
-    count = 1 + max(_LEAST_SAMPLES, round(length / float(np.median(np.diff(time)))))
-    even = np.linspace(time[0], time[-1], count)
-    signal = _detrended(even, np.interp(even, time, mode))
+    if len(time) < LEAST_SAMPLES:
+        return SurfacePeriod(reason=f"fewer than {LEAST_SAMPLES} samples of the surface")
+    even, signal = _even(time, mode)
+    length, count = float(time[-1] - time[0]), len(even)
     resolution = 1.0 / length
     nyquist = 0.5 * (count - 1) / length
     driving = 1.0 / driving_period if driving_period else math.nan
@@ -129,6 +127,32 @@ def surface_period(
     )
 
 
+def amplitude_spectrum(time: Floats, mode: Floats) -> tuple[Floats, Floats]:
+    """Frequencies [Hz] from 0 on and amplitudes [m] of a record of the surface mode [m] at rising times [s], shape (samples,) each.
+
+    As `surface_period` looks at it: at even times, without its straight line, Hann window, padded by zeros, so that a sine has a peak as
+    high as its amplitude. Both empty for fewer than LEAST_SAMPLES finite samples.
+    """
+    finite = np.isfinite(mode)
+    time, mode = time[finite], mode[finite]
+    if len(time) < LEAST_SAMPLES:
+        return np.zeros(0), np.zeros(0)
+    even, signal = _even(time, mode)
+    window = np.hanning(len(even))
+    size = _PADDING * len(even)
+    amplitude = np.asarray(2.0 * np.abs(np.fft.rfft(signal * window, size)) / window.sum(), dtype=np.float64)
+    frequency = np.fft.rfftfreq(size, float(even[-1] - even[0]) / (len(even) - 1))
+    return np.asarray(frequency, dtype=np.float64), amplitude
+
+
+def _even(time: Floats, mode: Floats) -> tuple[Floats, Floats]:
+    """Even times [s] over the same span, and the record at them less its straight line."""
+    length = float(time[-1] - time[0])
+    count = 1 + max(LEAST_SAMPLES, round(length / float(np.median(np.diff(time)))))
+    even = np.linspace(time[0], time[-1], count)
+    return even, _detrended(even, np.interp(even, time, mode))
+
+
 @dataclass(frozen=True)
 class DrivenMotion:
     """Oscillation at the driving frequency in the steady part of a record. NaN where it cannot be told; `reason` then says why.
@@ -153,8 +177,8 @@ def driven_motion(time: Floats, mode: Floats, driving_period: float, ramp: float
     """
     finite = np.isfinite(mode)
     time, mode = time[finite], mode[finite]
-    if len(time) < _LEAST_SAMPLES:
-        return DrivenMotion(reason=f"fewer than {_LEAST_SAMPLES} samples of the surface")
+    if len(time) < LEAST_SAMPLES:
+        return DrivenMotion(reason=f"fewer than {LEAST_SAMPLES} samples of the surface")
     first, end = float(time[0]) + ramp, float(time[-1]) - ramp
     tiny = 1e-6 * driving_period
     periods = max(int((_STEADY * (end - first) + tiny) / driving_period), _STEADY_PERIODS)
@@ -164,7 +188,7 @@ def driven_motion(time: Floats, mode: Floats, driving_period: float, ramp: float
         return DrivenMotion(reason=text)
     inside = (time >= start - tiny) & (time <= end + tiny)
     samples = int(np.count_nonzero(inside))
-    if samples < 2.5 * periods or samples < _LEAST_SAMPLES:
+    if samples < 2.5 * periods or samples < LEAST_SAMPLES:
         return DrivenMotion(reason=f"sampled too seldom for the driving period of {driving_period:.3g} s")
     fit, rest = _fitted(time[inside], mode[inside], 1.0 / driving_period)
     return DrivenMotion(float(np.hypot(fit[2], fit[3])), float(np.sqrt(np.mean(rest**2))), start, end, periods)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @click.command(name="compare", short_help="Compare runs side by side, and with the thesis; draw it.")
@@ -31,7 +35,15 @@ import click
 @click.option(
     "--stage", type=int, metavar="N", help="Histories, trajectories: stage N from 1 [default: the last of shaking]."
 )
-@click.option("--dpi", type=click.FloatRange(20, 1200), default=200.0, show_default=True, help="Resolution of PNG.")
+@click.option(
+    "--style",
+    "look",
+    type=click.Choice(["screen", "paper", "paper-wide"]),
+    default="screen",
+    show_default=True,
+    help="Paper: for a column of 85 mm, or two of 170 mm; 8 pt, no titles, which are printed as a caption.",
+)
+@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution of PNG [default: 200, for paper 600].")
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     files: tuple[Path, ...],
@@ -42,7 +54,8 @@ def command(
     output: Path | None,
     what: str | None,
     stage: int | None,
-    dpi: float,
+    look: str,
+    dpi: float | None,
     force: bool,
 ) -> None:
     """Compare the runs of result FILEs: a row a case, in the order of shaking and shape.
@@ -71,7 +84,7 @@ def command(
     from dem_cli.report.compare_figures import check_request, draw
     from dem_cli.report.compare_text import blocks
     from dem_cli.report.kinds import kind_of
-    from dem_cli.report.look import check_target, save, style
+    from dem_cli.report.look import check_target
     from dem_cli.report.text import show
 
     kind = kind_of(files)
@@ -79,7 +92,16 @@ def command(
         raise ScenarioError("runs of bodies in 3D are compared by dem report FILE FILE ...: a row a file")
     if kind == "increment":
         _shear_tests(
-            files, each, as_json, output, what, stage, dpi, force, idle={"--thesis": with_thesis, "--grains": grains}
+            files,
+            each,
+            as_json,
+            output,
+            what,
+            stage,
+            look,
+            dpi,
+            force,
+            idle={"--thesis": with_thesis, "--grains": grains},
         )
         return
     target = output or (Path(f"compare-{what}.png") if what else None)
@@ -88,13 +110,23 @@ def command(
         check_target(target, force)
     found = compare(files, with_thesis=with_thesis, each=each)
     if target:
-        with style():
-            save(draw(found, what or "table", stage=stage, with_thesis=with_thesis), target, dpi)
-        click.echo(f"wrote {target}", err=True)
+        _draw(target, look, dpi, lambda: draw(found, what or "table", stage=stage, with_thesis=with_thesis))
     if as_json:
         click.echo(json.dumps(found.as_dict(), indent=2, ensure_ascii=False, allow_nan=False))
     else:
         show(blocks(found, grains=grains), sys.stdout)
+
+
+def _draw(target: Path, look: str, dpi: float | None, figure_of: Callable[[], Figure]) -> None:
+    """Save a picture and say so, with its caption where the style has no titles."""
+    from dem_cli.report.look import caption, save, style
+
+    with style(look):
+        figure = figure_of()
+        save(figure, target, dpi or (200.0 if look == "screen" else 600.0))
+    click.echo(f"wrote {target}", err=True)
+    if look != "screen":
+        click.echo(f"caption: {caption(figure)}", err=True)
 
 
 def _shear_tests(
@@ -104,7 +136,8 @@ def _shear_tests(
     output: Path | None,
     what: str | None,
     stage: int | None,
-    dpi: float,
+    look: str,
+    dpi: float | None,
     force: bool,
     idle: Mapping[str, bool],
 ) -> None:
@@ -114,7 +147,7 @@ def _shear_tests(
     from contextlib import ExitStack
 
     from dem_cli.errors import ScenarioError
-    from dem_cli.report.look import check_target, save, style
+    from dem_cli.report.look import check_target
     from dem_cli.report.shear import shear_summary
     from dem_cli.report.shear_curves import draw_compared
     from dem_cli.report.shear_text import comparison
@@ -135,9 +168,7 @@ def _shear_tests(
         opened = [stack.enter_context(open_results(path)) for path in files]
         found = [shear_summary(results) for results in opened]
         if target:
-            with style():
-                save(draw_compared(opened, stage), target, dpi)
-            click.echo(f"wrote {target}", err=True)
+            _draw(target, look, dpi, lambda: draw_compared(opened, stage))
     if as_json:
         click.echo(json.dumps([one.as_dict() for one in found], indent=2, ensure_ascii=False, allow_nan=False))
     else:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-PICTURE_OPTIONS = {"file", "output", "what", "color", "dpi", "force"}
+PICTURE_OPTIONS = {"file", "output", "what", "color", "look", "dpi", "force"}
 
 
 def asked_for(files: Sequence[Path], each: bool = False) -> bool:
@@ -48,11 +48,12 @@ def render(
     what: str | None,
     measure: str | None,
     given: Collection[str],
+    look: str,
     dpi: float | None,
     force: bool,
 ) -> None:
     """A picture, by default in the sweep's folder; its name to stdout, what it shows to stderr. measure: that a map shows; given: names of
-    the options that are set.
+    the options that are set; look: the style.
     """
     from dem_cli.errors import ScenarioError
     from dem_cli.report.look import check_target, save, style
@@ -71,8 +72,8 @@ def render(
     found = read_sweep(path)
     if measure:
         found = found.by(measure)
-    with style():
+    with style(look):
         _, caption, figure = draw(found, what)
-        save(figure, target, dpi or 200.0)
+        save(figure, target, dpi or (200.0 if look == "screen" else 600.0))
     click.echo(caption, err=True)
     click.echo(str(target))

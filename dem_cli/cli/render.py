@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals")
+AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "normals", "energy-normals")
 
 
 @click.command(name="render", short_help="Draw a picture from a result file.")
@@ -17,19 +17,21 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals"
     "output",
     type=click.Path(path_type=Path),
     metavar="PICTURE",
-    help="PNG, SVG or PDF, of scenes GIF too [default: FILE-WHAT.png].",
+    help="PNG, SVG or PDF; GIF or MP4: an animation of the sample or scene [default: FILE-WHAT.png].",
 )
 @click.option(
     "--what",
     metavar="KIND",
-    help="One of the kinds below [default: sample, of bodies in 3D scene].",
+    help="One of the kinds above [default: sample, of bodies in 3D scene].",
 )
-@click.option("--time", type=float, metavar="T", help="Sample, rose, scene: the frame nearest to T seconds.")
+@click.option(
+    "--time", type=float, metavar="T", help="Sample, rose, force-distribution, scene: the frame nearest to T seconds."
+)
 @click.option(
     "--frame",
     type=int,
     metavar="K",
-    help="Sample, rose, scene, forces, normals: frame K from 0, or -1, -2, ... from the last.",
+    help="Sample, rose, scene, force-distribution, forces, normals: frame K from 0, or -1, -2, ... from the last.",
 )
 @click.option(
     "--increment",
@@ -64,7 +66,25 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "forces", "normals", "energy-normals"
 @click.option("--view", metavar="AZIMUTH,ELEVATION", help="Scene: where it is seen from, degrees [default: -62,24].")
 @click.option("--series", metavar="NAME,...", help="Series to draw; implies --what series.")
 @click.option("--grains", metavar="ID,...", help="Histories, trajectories: only these tracked grains.")
-@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, GIF 80].")
+@click.option(
+    "--style",
+    "look",
+    type=click.Choice(["screen", "paper", "paper-wide"]),
+    default="screen",
+    show_default=True,
+    help="Paper: for a column of 85 mm, or two of 170 mm; 8 pt, no titles, which are printed as a caption.",
+)
+@click.option(
+    "--fps",
+    type=click.FloatRange(0.1, 60),
+    help="Animation: frames of the file a second [default: as long as each lasts, 2 to 25; shear tests 10].",
+)
+@click.option(
+    "--speed", type=click.FloatRange(0, min_open=True), help="Animation: simulated seconds a second, in place of --fps."
+)
+@click.option(
+    "--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80, MP4 150]."
+)
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     file: Path,
@@ -83,71 +103,84 @@ def command(
     view: str | None,
     series: str | None,
     grains: str | None,
+    look: str,
+    fps: float | None,
+    speed: float | None,
     dpi: float | None,
     force: bool,
 ) -> None:
-    """Draw a picture from a result FILE, or of a SWEEP, and print its name.
+    """Draw a picture, or an animation, from a result FILE, or a picture of a SWEEP, and print its name.
 
     \b
-    sample        grains to scale, coloured by a quantity, with force chains
-    rose          directions of the contacts between grains, and their fabric
-    histories     displacement x, y and rotation of tracked grains
-    trajectories  ways of tracked grains
-    surface       free surface over place and time, and its antisymmetric mode
-    energy        ledger of energy as stacked areas
-    motion        acceleration, velocity and displacement of the container
-    series        any quantity of /series over time, or over increments
+    sample              grains to scale, coloured by a quantity, with force chains
+    rose                directions of the contacts between grains, and their fabric
+    force-distribution  density of the normal force over its mean, and its exponential tail
+    histories           displacement x, y and rotation of tracked grains
+    trajectories        ways of tracked grains
+    surface             free surface over place and time, and its antisymmetric mode
+    spectrum            amplitude spectrum of the surface's modes, the driving frequency, and what
+                        linear theory and the thesis give a liquid as deep
+    energy              ledger of energy as stacked areas
+    motion              acceleration, velocity and displacement of the container
+    series              any quantity of /series over time, or over increments
 
     \b
-    Of quasi-static shear tests (figures of Kishino 1988):
-    stress-strain   stress ratio and volumetric strain over the shear strain; of closed pores
-                    stress path and pore pressure too (7, 9)
-    forces          contact forces as rectangles at the start and the peak (6, 8, 10)
-    normals         rose of contact normals in percent, start and peak (11)
-    energy-normals  the same, weighted by elastic energy (12)
-    coordination    principal values of the coordination tensor (13)
-    energy-tensor   principal values of the tensor of elastic energy (14)
-    dissipation     work, dissipation and elastic energy (15)
-    largest-share   share of the contact that dissipates most in each increment (16)
-    ranked          contacts ranked by their share in chosen increments (17)
-    paper           all of them on a page
+    Of quasi-static shear tests (figures of Kishino 1988), beside sample, rose, force-distribution,
+    histories, trajectories and series:
+    stress-strain       stress ratio and volumetric strain over the shear strain; of closed pores
+                        stress path and pore pressure too (7, 9)
+    dilatancy           -de_v/d(e1 - e2) and the dilatancy angle over the shear strain
+    forces              contact forces as rectangles at the start and the peak (6, 8, 10)
+    normals             rose of contact normals in percent, start and peak (11)
+    energy-normals      the same, weighted by elastic energy (12)
+    coordination        principal values of the coordination tensor (13)
+    energy-tensor       principal values of the tensor of elastic energy (14)
+    dissipation         work, dissipation and elastic energy (15)
+    largest-share       share of the contact that dissipates most in each increment (16)
+    ranked              contacts ranked by their share in chosen increments (17)
+    paper               all of them on a page
 
     \b
     Of bodies in 3D, beside energy, series, histories and trajectories (in plan and section):
-    scene           bodies, planes and terrain, shaded; as a GIF (-o NAME.gif) all frames, or those of --stage
-    check           velocity over time beside the closed form that [output] check names
-    runout          how far bodies ran from where they started
+    scene               bodies, planes and terrain, shaded
+    check               velocity over time beside the closed form that [output] check names
+    runout              how far bodies ran from where they started
 
     \b
     Of a SWEEP, its folder or sweep.toml:
-    map             change of the void ratio, or --color MEASURE (named as in dem report --json), over two axes;
-                    over one axis curves (the default)
-    resonance       the surface's motion over the driving period by T1
-    shapes          shapes or scenarios side by side, before and after
+    map                 change of the void ratio, or --color MEASURE (named as in dem report --json), over
+                        two axes; over one axis curves (the default)
+    resonance           the surface's motion over the driving period by T1
+    shapes              shapes or scenarios side by side, before and after
 
-    Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces and
-    normals show one frame with --increment, --frame or --last.
+    Shear tests show the first stage of shearing (stress-strain: all of them) unless --stage says otherwise; forces,
+    normals and force-distribution show one frame with --increment, --frame or --last.
+
+    With -o NAME.gif or NAME.mp4 sample and scene become an animation: all frames, or those of --stage, with the same
+    axes and colours throughout.
 
     QUANTITY is radius, id, body, aspect, orientation, speed, spin, displacement, displacement_x,
     displacement_y, rotation, coordination, pressure, shear_stress, stress_xx, stress_yy or stress_xy;
     displacement and rotation count from the start of the frame's stage. Grains of several discs have one
-    displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only tells
-    grains apart. Of scenes it is kind, id, speed, spin, kinetic, displacement, rotation, height, mass or
-    coordination. Histories, trajectories, surface and motion show the last stage of shaking unless --stage
+    displacement, speed, aspect ratio and orientation, and the other quantities disc by disc; body only
+    tells grains apart. Of scenes it is kind, id, speed, spin, kinetic, displacement, rotation, height, mass or
+    coordination. Histories, trajectories, surface, spectrum and motion show the last stage of shaking unless --stage
     says otherwise.
     """
     # Imported here so that `dem --help` stays quick.
     from dem_cli.cli import of_sweep
     from dem_cli.errors import ScenarioError
-    from dem_cli.report import animation
     from dem_cli.report.figures import Picture, check_request, choose_frame, draw
     from dem_cli.report.kinds import kind_of
-    from dem_cli.report.look import check_target, save, style
-    from dem_cli.results import BodyResults, open_results
+    from dem_cli.report.look import caption, check_target, save, style
+    from dem_cli.report.movies import ENDINGS
+    from dem_cli.results import open_results
 
     if of_sweep.asked_for([file]):
-        options = {name for name, value in click.get_current_context().params.items() if value not in (None, False)}
-        of_sweep.render(file, output, what, color, options, dpi, force)
+        context = click.get_current_context()
+        source = click.core.ParameterSource.COMMANDLINE
+        options = {name for name in context.params if context.get_parameter_source(name) is source}
+        of_sweep.render(file, output, what, color, options, look, dpi, force)
         return
     if sum((time is not None, frame is not None, increment is not None, last)) > 1:
         raise ScenarioError("--time, --frame, --increment and --last exclude each other")
@@ -185,20 +218,29 @@ def command(
     }
     _refuse_idle(picture.what, given)
     target = output or file.with_name(f"{file.stem}-{picture.what}.png")
-    moving = target.suffix.lower() == animation.ENDING and picture.what == "scene"
+    moving = target.suffix.lower() in ENDINGS
     if moving:
-        animation.check_gif(target, force)
+        _check_animation(
+            target, picture.what, force, fps, speed, moment or time is not None or increment is not None, look
+        )
     else:
+        if fps or speed:
+            raise ScenarioError(f"--fps and --speed are for animations: name a .gif or .mp4 with -o, not {target.name}")
         check_target(target, force)
     with open_results(file) as results:
         if not results.complete:
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
-        with style():
-            if moving and isinstance(results, BodyResults):
-                _refuse_moment(time is not None or moment)
-                animation.save_animation(results, picture, target, dpi or 80.0)
+        with style(look):
+            if moving:
+                from dem_cli.report.animation import save_animation
+
+                reel = save_animation(results, picture, target, dpi=dpi, fps=fps, speed=speed)
+                click.echo(f"{len(reel.shown)} frames, {reel.seconds:.3g} s", err=True)
             else:
-                save(draw(results, picture), target, dpi or 200.0)
+                figure = draw(results, picture)
+                save(figure, target, dpi or (200.0 if look == "screen" else 600.0))
+                if look != "screen":
+                    click.echo(f"caption: {caption(figure)}", err=True)
         if increment is not None:
             shown = float(results.frame_times[choose_frame(results, picture)])
             asked = increment + (results.stages[stage - 1].start if stage else 0.0)
@@ -216,7 +258,7 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
     from dem_cli.errors import ScenarioError
 
     kinds = {
-        "--time": ("sample", "scene", "rose"),
+        "--time": ("sample", "scene", "rose", "force-distribution"),
         "--frame/--last": AT_ONE_FRAME,
         "--increment": AT_ONE_FRAME,
         "--color": ("sample", "scene"),
@@ -236,13 +278,26 @@ def _refuse_idle(what: str, given: Mapping[str, object]) -> None:
             raise ScenarioError(f"{option} has no meaning for --what {what}, only for {names}")
 
 
-def _refuse_moment(given: bool) -> None:
+def _check_animation(
+    target: Path, what: str, force: bool, fps: float | None, speed: float | None, moment: bool, look: str
+) -> None:
+    """Raise DemError for what can be no animation, or one that would be overwritten. moment: one frame is asked for."""
     from dem_cli.errors import ScenarioError
+    from dem_cli.report.movies import check_target
 
-    if given:
+    if what not in ("sample", "scene"):
         raise ScenarioError(
-            "an animation shows all frames, or those of --stage; --time, --frame and --last choose one for a picture"
+            f"{target}: --what {what} does not move, only sample and scene do; write .png, .svg or .pdf"
         )
+    if moment:
+        raise ScenarioError(
+            "an animation shows all frames, or those of --stage; --time, --frame, --increment and --last choose one for a picture"
+        )
+    if fps and speed:
+        raise ScenarioError("--fps and --speed exclude each other")
+    if look != "screen":
+        raise ScenarioError(f"--style {look} is for pictures on a page, not for an animation")
+    check_target(target, force)
 
 
 def _angles(text: str) -> tuple[float, float]:

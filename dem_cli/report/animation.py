@@ -1,63 +1,87 @@
-"""Bodies in 3D in motion: all frames of a run, or of a stage, as a GIF."""
+"""Runs in motion: all frames of a run, or of a stage, as GIF or MP4, of grains in 2D and of bodies in 3D."""
 
 from __future__ import annotations
 
-import io
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.errors import ScenarioError
 from dem_cli.report.body_quantities import BODY_QUANTITIES
-from dem_cli.report.figures import Picture, check_request
+from dem_cli.report.figures import Picture, check_file, check_request, look_of
 from dem_cli.report.impulse_figures import check_bodies
+from dem_cli.report.moments import frames_of_stage
+from dem_cli.report.movies import RATE, Image, Reel, at_speed, every_frame, write
 from dem_cli.report.scene3d import default_color, draw_scene, values_of, view_of
-from dem_cli.results import BodyResults
+from dem_cli.results import BodyResults, Results
 
-ENDING = ".gif"
-SHORTEST, LONGEST = 40, 500  # ms that a frame is shown
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-
-def check_gif(path: Path, force: bool) -> None:
-    """Raise ResultsError if `path` would be overwritten without `force`."""
-    if path.exists() and not force:
-        raise ResultsError(f"{path} exists; choose another name with -o or add --force")
+KINDS = ("sample", "scene")  # of pictures that can move
+DPI = {".gif": 80.0, ".mp4": 150.0}
 
 
-def save_animation(results: BodyResults, picture: Picture, path: Path, dpi: float) -> int:
-    """Write the scene of each frame, with the same view and colours; each is shown as long as it lasts, within limits. Returns their number."""
-    from PIL import Image
+def save_animation(
+    results: Results, picture: Picture, path: Path, *, dpi: float | None = None, fps: float | None = None, speed: float | None = None
+) -> Reel:  # fmt: skip
+    """Write each frame with the same axes and colours; returns what the film shows. Call inside `look.style()`.
 
+    fps: frames of the file a second, by default as long as each lasts, within limits. speed: simulated seconds a second; one of both.
+    """
     check_request(picture)
-    if check_bodies(results, picture) != "scene":
-        raise ScenarioError(f"{path}: only --what scene can be an animation")
+    bodies = isinstance(results, BodyResults)
+    what = check_bodies(results, picture) if isinstance(results, BodyResults) else picture.what
+    if what not in KINDS:
+        raise ScenarioError(f"{path}: only --what sample, or scene of bodies in 3D, can be an animation")
+    if not bodies:
+        check_file(results, picture)
+    over_time = results.axis == "time"
+    if speed is not None and not over_time:
+        raise ScenarioError(f"{results.path}: a quasi-static test has no time; choose --fps, not --speed")
     frames = frames_of(results, picture.stage)
-    color = picture.color or default_color(results)
-    view = view_of(results, frames, picture.view)
-    limits = picture.limits or _limits(results, frames, color)
-    images = []
-    for k in frames:
-        figure = draw_scene(results, k, color=color, chains=bool(picture.chains), limits=limits, view=view)
-        with io.BytesIO() as stream:
-            figure.savefig(stream, format="png", dpi=dpi)
-            stream.seek(0)
-            images.append(Image.open(stream).convert("RGB").quantize(128))
-    spans = np.diff(results.frame_times[frames], append=np.nan)
-    typical = float(np.nanmedian(spans)) if len(frames) > 1 else 0.1
-    length = int(np.clip(round(1000.0 * typical, -1), SHORTEST, LONGEST))
-    try:
-        images[0].save(path, save_all=True, append_images=images[1:], duration=length, loop=0)
-    except OSError as error:
-        raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
-    return len(images)
+    ending = path.suffix.lower()
+    places = results.frame_times[frames]
+    reel = at_speed(frames, places, speed, RATE[ending]) if speed else every_frame(frames, places, over_time, fps)
+    dots = dpi or DPI[ending]
+    if isinstance(results, BodyResults):
+        write(path, reel, _scenes(results, picture, frames, dots))
+    else:
+        from dem_cli.report.sample_film import SampleFilm
+
+        write(path, reel, SampleFilm(results, frames, look_of(picture), dots).image)
+    return reel
 
 
-def frames_of(results: BodyResults, stage: int | None) -> list[int]:
+def frames_of(results: Results, stage: int | None) -> list[int]:
     """Numbers of the frames of a stage (from 1), or of the whole run. ScenarioError without any."""
+    if stage and results.axis == "increment":
+        return [int(k) for k in frames_of_stage(results, stage)]
     found = np.arange(results.n_frames) if not stage else np.flatnonzero(results.frame_stages == stage - 1)
     if len(found) == 0:
         raise ScenarioError(f"{results.path}: holds no frame to draw")
     return [int(k) for k in found]
+
+
+def _scenes(results: BodyResults, picture: Picture, frames: list[int], dpi: float) -> Callable[[int], Image]:
+    """Draws the scene of a frame."""
+    color = picture.color or default_color(results)
+    view = view_of(results, frames, picture.view)
+    limits = picture.limits or _limits(results, frames, color)
+    chains = bool(picture.chains)
+    return lambda k: pixels(draw_scene(results, k, color=color, chains=chains, limits=limits, view=view), dpi)
+
+
+def pixels(figure: Figure, dpi: float) -> Image:
+    """The figure as an image."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure.set_dpi(dpi)
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())[..., :3]
 
 
 def _limits(results: BodyResults, frames: list[int], color: str) -> tuple[float, float] | None:

@@ -14,7 +14,18 @@ from dem_cli.report import thesis
 from dem_cli.report.cases import Case, Pooled
 from dem_cli.report.compare import Comparison
 from dem_cli.report.figures import unknown
-from dem_cli.report.look import COLORS, DIVERGING, largest, new_figure
+from dem_cli.report.look import (
+    COLORS,
+    DIVERGING,
+    LETTERS,
+    current,
+    describe,
+    largest,
+    new_figure,
+    small,
+    title,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -85,9 +96,12 @@ def draw_table(cases: Sequence[Case], *, with_thesis: bool = False) -> Figure:
     bottom.set_ylim(bottom=min(-0.04 * bottom.get_ylim()[1], -0.02))
     _name_groups(bottom, at, cases)
     figure.align_ylabels()
-    figure.legend(
-        handles=_legend(colors, with_thesis), loc="outside upper center", ncols=min(4, len(colors) + 2 + with_thesis)
-    )
+    longest = max(len(kind) for kind in colors) / LETTERS[current().titles] + 0.5
+    ncols = min(4, len(colors) + 2 + with_thesis, max(int(figure.get_figwidth() / longest), 1))
+    room = figure.get_figwidth() / ncols - 0.5
+    note = "Void ratio and surface roughness, packed (ring) and after shaking (dot), and most airborne grains; bars: standard deviation"
+    describe(figure, note + ("; black bars: the thesis" if with_thesis else ""))
+    figure.legend(handles=_legend(colors, with_thesis, room), loc="outside upper center", ncols=ncols)
     return figure
 
 
@@ -136,13 +150,14 @@ def _name_groups(ax: Axes, at: Sequence[float], cases: Sequence[Case]) -> None:
     ax.set_xlim(min(at) - 0.8, max(at) + 0.8)
 
 
-def _legend(colors: dict[str, str], with_thesis: bool) -> list[Any]:
+def _legend(colors: dict[str, str], with_thesis: bool, room: float) -> list[Any]:
+    """room: width of a name [inch]."""
     from matplotlib.lines import Line2D
 
     def mark(label: str, color: str, face: str) -> Line2D:
         return Line2D([], [], ls="", marker="o", ms=5.5, mec=color, mfc=face, label=label)
 
-    shown = [mark(kind.replace("$", r"\$"), color, color) for kind, color in colors.items()]
+    shown = [mark(wrapped(kind, room).replace("$", r"\$"), color, color) for kind, color in colors.items()]
     shown += [mark("packed", "0.4", "white"), mark("after shaking", "0.4", "0.4")]
     return [*shown, Line2D([], [], color="black", lw=2.0, label="thesis")] if with_thesis else shown
 
@@ -179,7 +194,7 @@ def draw_grid(cases: Sequence[Case]) -> Figure:
         ax.set_axis_off()
     for ax, (kind, grid) in zip(axes.flat, kinds.items(), strict=False):
         image = ax.imshow(change[kind], cmap=DIVERGING, vmin=-reach, vmax=reach, origin="lower", aspect="auto")
-        ax.set_title(kind, parse_math=False)
+        ax.set_title(wrapped(kind, figure.get_figwidth() / columns - 0.4), parse_math=False)
         ax.set_xticks(range(len(frequencies)), [f"{f:.4g}" for f in frequencies])
         ax.set_yticks(range(len(amplitudes)), [f"{100.0 * a:.4g}" for a in amplitudes])
         ax.set_xlabel("frequency [Hz]")
@@ -187,10 +202,10 @@ def draw_grid(cases: Sequence[Case]) -> Figure:
         for (row, column), value in np.ndenumerate(change[kind]):
             cell = _cell(grid.get((amplitudes[row], frequencies[column])))
             dark = math.isfinite(value) and abs(value) > 0.62 * reach
-            ax.text(column, row, cell, ha="center", va="center", fontsize=8, color="white" if dark else "black")
+            ax.text(column, row, cell, ha="center", va="center", fontsize=small(), color="white" if dark else "black")
     if image is not None:
-        figure.colorbar(image, ax=axes, aspect=30, pad=0.02).set_label("change of the void ratio by shaking")
-    figure.suptitle("Change of the void ratio, before shaking to after it (- denser)")
+        figure.colorbar(image, ax=axes, aspect=30, pad=0.02).set_label("change of the void ratio")
+    title(figure, "Change of the void ratio, before shaking to after it (- denser)")
     return figure
 
 

@@ -11,7 +11,17 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.cases import Case
-from dem_cli.report.look import COLORS, axis_label, display_unit, largest, new_figure, stage_label
+from dem_cli.report.look import (
+    COLORS,
+    axis_label,
+    display_unit,
+    largest,
+    narrow,
+    new_figure,
+    stage_label,
+    title,
+    wrapped,
+)
 from dem_cli.report.tracked import Paths, draw_path, paths
 from dem_cli.results import open_results
 from dem_cli.state import Floats
@@ -106,13 +116,14 @@ def _column(head: str, way: Paths) -> Column:
     )
 
 
-def _panels(found: Columns, width: float, height: float) -> tuple[Figure, list[list[Axes]]]:
+def _panels(found: Columns, width: float, height: float, *, rigid: bool = False) -> tuple[Figure, list[list[Axes]]]:
     """A figure of a panel for each grain and run, headed, each with its grain's number; where a run tracks fewer, panels are off."""
     rows, columns = found.rows, len(found.columns)
-    figure = new_figure(width * columns + 1.3, height * rows + 1.6)
+    figure = new_figure(width * columns + 1.3, height * rows + 1.6, rigid=rigid)
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    room = max(figure.get_figwidth() - (0.9 if narrow() else 1.3), 1.0) / columns
     for k, column in enumerate(found.columns):
-        axes[0, k].set_title(column.head, parse_math=False)
+        axes[0, k].set_title(wrapped(column.head, room), parse_math=False)
         for row in range(rows):
             if row >= len(column.ids):
                 axes[row, k].set_axis_off()
@@ -149,9 +160,11 @@ def draw_histories(found: Columns) -> Figure:
     axes[0][0].set_xlim(0.0, max(float(c.time[-1]) for c in found.columns))
     for ax in axes[-1]:
         ax.set_xlabel("time [s]")
-    figure.supylabel(f"{axis_label('displacement', unit)}; right: {axis_label('rotation', turn_unit)}", fontsize=9.0)
+    figure.supylabel(
+        f"{axis_label('displacement', unit)}; right: {axis_label('rotation', turn_unit)}", fontsize="medium"
+    )
     figure.legend(handles=handles, loc="outside lower center", ncols=3)
-    figure.suptitle(f"Displacements of grains, {found.title}", parse_math=False)
+    title(figure, f"Displacements of grains, {found.title}")
     return figure
 
 
@@ -166,7 +179,7 @@ def draw_trajectories(found: Columns) -> Figure:
     # A path along one axis alone still gets a panel that is not a slit.
     half_x, half_y = max(half_x, 0.4 * half_y), max(half_y, 0.4 * half_x)
     width = 2.2 * min(1.0, half_x / half_y)
-    figure, axes = _panels(found, width + 0.25, width * half_y / half_x + 0.1)
+    figure, axes = _panels(found, width + 0.25, width * half_y / half_x + 0.1, rigid=narrow())
     end = max(float(c.time[-1]) for c in found.columns)
     lines = None
     for k, column in enumerate(found.columns):
@@ -177,12 +190,14 @@ def draw_trajectories(found: Columns) -> Figure:
             lines = draw_path(ax, x - middle_x, y - middle_y, column.time)
             lines.set_clim(0.0, end)
             ax.set_aspect("equal")
+    if narrow():
+        axes[0][0].locator_params(nbins=2, min_n_ticks=1)
     axes[0][0].set_xlim(-half_x, half_x)
     axes[0][0].set_ylim(-half_y, half_y)
-    figure.supxlabel(axis_label("x about the middle of the path", unit), fontsize=9.0)
-    figure.supylabel(axis_label("y about the middle of the path", unit), fontsize=9.0)
+    figure.supxlabel(axis_label("x about the middle of the path", unit), fontsize="medium")
+    figure.supylabel(axis_label("y about the middle of the path", unit), fontsize="medium")
     if lines is not None:
         flat = [ax for row in axes for ax in row]
         figure.colorbar(lines, ax=flat, aspect=40, pad=0.02).set_label("time since the stage began [s]")
-    figure.suptitle(f"Trajectories in the container, {found.title}", parse_math=False)
+    title(figure, f"Trajectories in the container, {found.title}")
     return figure

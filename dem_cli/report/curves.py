@@ -18,7 +18,9 @@ from dem_cli.report.look import (
     heading,
     largest,
     mark_stages,
+    narrow,
     new_figure,
+    small,
 )
 from dem_cli.results import Results
 from dem_cli.state import Bools, Floats
@@ -76,6 +78,7 @@ def draw_series(results: Results, names: Sequence[str], window: Window, text: st
         ax.set_ylabel(axis_label(name.replace("_", " "), unit))
         if not np.isfinite(values).any():
             ax.text(0.5, 0.5, "not defined here", transform=ax.transAxes, ha="center", color="0.35")
+    figure.align_ylabels()
     _time_axis(results, list(axes), time[inside])
     heading(figure, results, text)
     return figure
@@ -115,7 +118,11 @@ def draw_energy(results: Results, window: Window, text: str, ledger: Ledger = LE
     line = upper.plot(time, must / factor, color="black", lw=1.0, ls=(0, (4, 2)), label=ledger.label)
     upper.set_ylabel(axis_label("energy", unit))
     upper.set_ylim(bottom=0.0)
-    upper.legend(handles=[*line, *reversed(areas)], loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=8)
+    handles = [*line, *reversed(areas)]
+    if narrow():
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
+    else:
+        upper.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=small())
     residual = column("residual")
     factor, unit = display_unit("J", largest(residual))
     lower.plot(time, residual / factor, color="black", lw=0.9)
@@ -144,7 +151,7 @@ def draw_surface(results: Results, window: Window, text: str, limits: tuple[floa
     extend = extension(rise.compressed(), low, high)
     place, place_unit = display_unit("m", results.width)
     figure = new_figure(7.5, 5.0)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2) if narrow() else (2, 1))
     image = upper.pcolormesh(
         _edges(time),
         _edges(np.asarray(surface.x)) / place,

@@ -10,21 +10,35 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import stage_label
+from dem_cli.report.look import place_text, stage_label
 from dem_cli.results import BodyResults, Results
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-KINDS = ("sample", "rose", "histories", "trajectories", "surface", "energy", "motion", "series")  # of runs over time
-# Of quasi-static shear tests, beside the five that need no time.
+    from dem_cli.report.sample import Look
+
+# Of runs over time.
+KINDS = (
+    "sample",
+    "rose",
+    "force-distribution",
+    "histories",
+    "trajectories",
+    "surface",
+    "spectrum",
+    "energy",
+    "motion",
+    "series",
+)
+# Of quasi-static shear tests, beside the six that need no time.
 SHEAR_KINDS = (
-    "stress-strain", "forces", "normals", "energy-normals", "coordination", "energy-tensor", "dissipation", "largest-share",
+    "stress-strain", "dilatancy", "forces", "normals", "energy-normals", "coordination", "energy-tensor", "dissipation", "largest-share",
     "ranked", "paper",
 )  # fmt: skip
 # Of bodies in 3D, beside energy and series.
 BODY_KINDS = ("scene", "check", "runout", "trajectories", "histories")
-OVER_TIME = ("surface", "energy", "motion")  # kinds that a quasi-static test has not
+OVER_TIME = ("surface", "spectrum", "energy", "motion")  # kinds that a quasi-static test has not
 DEFAULT_SERIES = ("void_ratio", "depth", "coordination", "kinetic")
 INCREMENT_SERIES = ("stress_ratio", "volumetric_strain", "void_ratio", "coordination")
 
@@ -58,7 +72,7 @@ def draw(results: Results, picture: Picture) -> Figure:
     `look.style()`.
     """
     # Imported here so that one kind of picture does not load what only another needs.
-    from dem_cli.report import curves, motions, rose, sample, tracked
+    from dem_cli.report import curves, motions, rose, sample, spectrum, tracked
 
     check_request(picture)
     if isinstance(results, BodyResults):
@@ -66,22 +80,18 @@ def draw(results: Results, picture: Picture) -> Figure:
 
         _check_stage(results, picture)
         return impulse_figures.draw_bodies(results, picture)
-    _check_file(results, picture)
+    check_file(results, picture)
     if picture.what in SHEAR_KINDS:
         return _draw_shear(results, picture)
     if picture.what == "sample":
-        return sample.draw_sample(
-            results,
-            choose_frame(results, picture),
-            color=picture.color or "displacement",
-            chains=picture.chains,
-            bonds=picture.bonds,
-            marks=picture.marks,
-            limits=picture.limits,
-        )
+        return sample.draw_sample(results, choose_frame(results, picture), look_of(picture))
     if picture.what == "rose":
         return rose.draw_rose(results, choose_frame(results, picture))
+    if picture.what == "force-distribution":
+        return _draw_distribution(results, picture)
     window, text = choose_window(results, picture)
+    if picture.what == "spectrum":
+        return spectrum.draw_spectrum(results, chosen_stage(results, picture), text)
     if picture.what == "histories":
         return tracked.draw_histories(results, tracked.paths(results, window, picture.grains), text)
     if picture.what == "trajectories":
@@ -97,6 +107,33 @@ def draw(results: Results, picture: Picture) -> Figure:
     if picture.what == "energy":
         return curves.draw_energy(results, window, text)
     return curves.draw_series(results, series_of(results, picture), window, text)
+
+
+def look_of(picture: Picture) -> Look:
+    """How a sample is drawn."""
+    from dem_cli.report.sample import Look
+
+    return Look(picture.color or "displacement", picture.chains, picture.bonds, picture.marks, picture.limits)
+
+
+def _draw_distribution(results: Results, picture: Picture) -> Figure:
+    """Of the frame that is asked for, or the last; of a test that shears its sample the start and the peak."""
+    from dem_cli.report.force_distribution import draw_forces_spread
+    from dem_cli.report.shear_rows import shear_stages
+
+    asked = picture.frame is not None or picture.increment is not None
+    if results.axis == "increment" and shear_stages(results) and not asked:
+        from dem_cli.report import shear_forces
+
+        stage = picture.stage or None
+        moments = shear_forces.start_and_peak(results, stage)
+        frames = [(one.frame.contacts, one.text) for one in moments]
+        return draw_forces_spread(results, frames, shear_forces.stage_text(results, stage))
+    index = choose_frame(results, picture)
+    frame, text = results.frame(index), place_text(results, index)
+    if 0 <= frame.stage < len(results.stages):
+        text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
+    return draw_forces_spread(results, [(frame.contacts, place_text(results, index))], text)
 
 
 def _draw_shear(results: Results, picture: Picture) -> Figure:
@@ -176,17 +213,25 @@ def choose_window(results: Results, picture: Picture) -> tuple[tuple[float, floa
     stages = results.stages
     time = results.series[results.axis]
     end = float(time[-1]) if len(time) else 0.0
-    number = picture.stage
-    if number is None:
-        number = 0
-        if picture.what not in ("series", "energy") and len(stages) > 1:
-            shaken = [k for k, stage in enumerate(stages, start=1) if stage.kind == "shake"]
-            number = shaken[-1] if shaken else len(stages)
+    number = chosen_stage(results, picture)
     if number == 0:
         return (float(time[0]) if len(time) else 0.0, end), "whole run"
     stage = stages[number - 1]
     stop = stage.end if np.isfinite(stage.end) else end
     return (stage.start, stop), stage_label(number, stage)
+
+
+def chosen_stage(results: Results, picture: Picture) -> int:
+    """Number of the stage (from 1) that a picture over time is about, 0 for the whole run. ScenarioError if a spectrum is to be of that."""
+    stages, number = results.stages, picture.stage
+    if number is None:
+        number = 0
+        if picture.what == "spectrum" or (picture.what not in ("series", "energy") and len(stages) > 1):
+            shaken = [k for k, stage in enumerate(stages, start=1) if stage.kind == "shake"]
+            number = shaken[-1] if shaken else len(stages)
+    if number == 0 and picture.what == "spectrum":
+        raise ScenarioError(f"{results.path}: a spectrum is that of one stage; choose --stage 1 to {len(stages)}")
+    return number
 
 
 def check_request(picture: Picture) -> None:
@@ -207,7 +252,7 @@ def check_request(picture: Picture) -> None:
         raise ScenarioError(f"--range {low:g},{high:g}: the second number must be the larger")
 
 
-def _check_file(results: Results, picture: Picture) -> None:
+def check_file(results: Results, picture: Picture) -> None:
     from dem_cli.report.quantities import QUANTITIES
 
     if picture.what in BODY_KINDS and picture.what not in KINDS:

@@ -18,7 +18,7 @@ from dem_cli.report.impulse_checks import (
 )
 from dem_cli.report.impulse_histories import History, histories
 from dem_cli.report.impulse_runout import runout
-from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure
+from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure, small
 from dem_cli.results import BodyResults
 from dem_cli.state import Floats
 
@@ -50,7 +50,7 @@ def draw_check(results: BodyResults) -> Figure:
     ax.set_xlabel("t [s]")
     ax.set_ylabel(ylabel)
     ax.margins(x=0.0)
-    ax.legend(fontsize=8)
+    ax.legend(fontsize=small())
     heading(figure, results, text)
     return figure
 
@@ -145,7 +145,7 @@ def draw_runout(results: BodyResults) -> Figure:
         value = float(np.percentile(distance, share))
         ax.axvline(value, color=COLORS[1], lw=1.0, ls=(0, (4, 2)))
         ax.annotate(
-            f" {share} %", (value, 1.0), xycoords=("data", "axes fraction"), va="top", color=COLORS[1], fontsize=8
+            f" {share} %", (value, 1.0), xycoords=("data", "axes fraction"), va="top", color=COLORS[1], fontsize=small()
         )
     right = ax.twinx()
     right.spines["right"].set_visible(True)
@@ -160,7 +160,7 @@ def draw_runout(results: BodyResults) -> Figure:
     right.set_ylim(0.0, 105.0)
     right.set_ylabel("went farther [%] (line)")
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    figure.legend(loc="outside lower center", ncols=2, fontsize=8)
+    figure.legend(loc="outside lower center", ncols=2, fontsize=small())
     angle = found.angle[np.isfinite(found.angle)]
     reach = f", angle of reach {math.degrees(float(np.median(angle))):.3g} deg (median)" if len(angle) else ""
     heading(figure, results, f"Run-out until t = {found.time:.6g} s{reach}")

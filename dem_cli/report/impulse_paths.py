@@ -10,7 +10,7 @@ import numpy as np
 
 from dem_cli.errors import ScenarioError
 from dem_cli.report.body_quantities import turn
-from dem_cli.report.look import COLORS, axis_label, display_unit, heading, largest, new_figure
+from dem_cli.report.look import COLORS, axis_label, display_unit, heading, largest, mark_size, narrow, new_figure, small
 from dem_cli.report.tracked import MOST_PANELS
 from dem_cli.results import BodyResults
 from dem_cli.rigid import Terrain
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+DASHES = ("-", (0, (5, 1.5)), (0, (5, 1, 1, 1)))  # of x, y and z
 MOST_PATHS = 200  # of bodies followed by frames alone
 
 
@@ -75,8 +76,8 @@ def draw_trajectories(
     along = way / np.linalg.norm(way) if np.linalg.norm(way) > 1e-12 else np.array([1.0, 0.0])
     origin = plan[0].mean(axis=0)
     section = (plan - origin) @ along
-    figure = new_figure(10.0, 4.6)
-    left, right = figure.subplots(1, 2)
+    figure = new_figure(*((5.0, 7.0) if narrow() else (10.0, 4.6)))
+    left, right = figure.subplots(2, 1) if narrow() else figure.subplots(1, 2)
     if results.terrain is not None:
         _draw_terrain(left, right, results.terrain, origin, along, section)
     for k, number in enumerate(found.ids.tolist()):
@@ -91,7 +92,7 @@ def draw_trajectories(
     left.set_title("plan")
     right.set_title("section")
     if len(found.ids) <= len(COLORS):
-        left.legend(fontsize=8)
+        left.legend(fontsize=small())
     heading(figure, results, f"Trajectories of {len(found.ids)} {'body' if len(found.ids) == 1 else 'bodies'}, {text}")
     return figure
 
@@ -99,8 +100,8 @@ def draw_trajectories(
 def _draw_way(ax: Axes, x: Floats, y: Floats, color: str, label: str | None) -> None:
     """A way from its ring to its dot."""
     ax.plot(x, y, color=color, lw=0.9, label=label)
-    ax.plot(x[0], y[0], "o", ms=4.5, mfc="white", mec=color, mew=0.9)
-    ax.plot(x[-1], y[-1], "o", ms=3.5, color=color)
+    ax.plot(x[0], y[0], "o", ms=mark_size(4.5), mfc="white", mec=color, mew=0.9)
+    ax.plot(x[-1], y[-1], "o", ms=mark_size(3.5), color=color)
 
 
 def _draw_terrain(left: Axes, right: Axes, terrain: Terrain, origin: Floats, along: Floats, section: Floats) -> None:
@@ -149,7 +150,7 @@ def draw_histories(
         right.set_yticks([0, 90, 180])
         lines = [
             *(
-                ax.plot(found.time, moved[:, k, n] / factor, color=COLORS[n], label=name)[0]
+                ax.plot(found.time, moved[:, k, n] / factor, color=COLORS[n], ls=DASHES[n], label=name)[0]
                 for n, name in enumerate("xyz")
             ),
             *right.plot(found.time, turned[:, k], color="0.45", ls=(0, (1, 1)), label="turned by (right)"),

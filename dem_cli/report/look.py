@@ -1,5 +1,5 @@
-"""How pictures look: figures without a window, colours that survive colour blindness and print, units that
-read well.
+"""How pictures look: figures without a window, styles for screen and paper, colours that survive colour blindness and print, units
+that read well.
 """
 
 from __future__ import annotations
@@ -7,6 +7,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -45,6 +47,52 @@ _RC: dict[str, Any] = {
     "pdf.fonttype": 42,
     "svg.hashsalt": "dem-cli",
 }
+_PAPER: dict[str, Any] = {
+    # A Times that comes with matplotlib, so that pictures are the same on every machine.
+    "mathtext.fontset": "stix",
+    "font.size": 8.0,
+    "axes.titlesize": 8.0,
+    "axes.labelpad": 2.5,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
+    "legend.fontsize": 7.0,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.2,
+    "axes.linewidth": 0.5,
+    "lines.linewidth": 0.8,
+    "patch.linewidth": 0.5,
+    **{f"{axis}tick.{part}": size for axis in "xy" for part, size in (
+        ("major.width", 0.5), ("minor.width", 0.4), ("major.size", 2.5), ("minor.size", 1.5), ("major.pad", 2.0),
+    )},
+    "svg.fonttype": "none",  # text stays text
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Style:
+    """Settings of matplotlib; width [inch] that figures have, None: their own; whether they bear titles and notes.
+
+    small: size [points] of secondary text.
+    """
+
+    rc: dict[str, Any] = field(default_factory=dict)
+    family: str = "DejaVu Sans"
+    width: float | None = None
+    titles: bool = True
+    small: float = 8.0
+
+
+# One column, and two, of a journal's page: 85 and 170 mm. Titles become captions, which `save` puts into the file.
+STYLES = {
+    "screen": Style(),
+    "paper": Style(_PAPER, "STIXGeneral", 85.0 / 25.4, titles=False, small=7.0),
+    "paper-wide": Style(_PAPER, "STIXGeneral", 170.0 / 25.4, titles=False, small=7.0),
+}
+_CURRENT: ContextVar[Style] = ContextVar("style", default=STYLES["screen"])
+LETTERS = {True: 11.5, False: 14.0}  # an inch, of styles with titles and without
+HIGHEST = 9.5  # inch, of a figure on a page
+NARROW = 4.5  # inch, below which what stands side by side goes below each other
+
 # Fonts with Japanese glyphs, for titles; the first that is installed is used beside the default.
 _CJK_FONTS = ("Noto Sans CJK JP", "IPAexGothic", "IPAGothic", "Hiragino Sans", "Yu Gothic", "MS Gothic")
 
@@ -94,22 +142,71 @@ def extension(values: Floats, low: float, high: float) -> Extend:
 
 
 @contextmanager
-def style() -> Iterator[None]:
-    """Settings under which all pictures are drawn and saved; leaves matplotlib as it was."""
+def style(name: str = "screen") -> Iterator[None]:
+    """Settings under which all pictures are drawn and saved, one of STYLES; leaves matplotlib as it was."""
     import matplotlib
     from matplotlib import font_manager
 
+    chosen = STYLES[name]
     installed = set(font_manager.get_font_names())
-    family = ["DejaVu Sans", *[name for name in _CJK_FONTS if name in installed][:1]]
-    settings: Any = {**_RC, "font.family": family}
-    with matplotlib.rc_context(settings):
-        yield
+    family = [chosen.family, *[name for name in _CJK_FONTS if name in installed][:1]]
+    settings: Any = {**_RC, **chosen.rc, "font.family": family}
+    token = _CURRENT.set(chosen)
+    try:
+        with matplotlib.rc_context(settings):
+            yield
+    finally:
+        _CURRENT.reset(token)
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """Figure of `width` x `height` inches that belongs to no window."""
+def current() -> Style:
+    """The style that pictures are drawn in now."""
+    return _CURRENT.get()
+
+
+def small() -> float:
+    """Size of secondary text [points]."""
+    return _CURRENT.get().small
+
+
+def narrow() -> bool:
+    """Whether figures are as wide as one column of a page."""
+    width = _CURRENT.get().width
+    return width is not None and width < NARROW
+
+
+def mark_size(points: float) -> float:
+    """Diameter of a mark [points]: smaller in a column of a page."""
+    return 0.6 * points if narrow() else points
+
+
+def folded(text: str) -> str:
+    """`start, increment 6, e1 - e2 = 0 %` for a panel: on two lines, broken at its last comma, in a column of a page."""
+    return "\n".join(text.rsplit(", ", 1)) if narrow() else text
+
+
+def wrapped(text: str, width: float) -> str:
+    """Lines of text folded to `width` inches, by the mean width of letters of the style's titles."""
+    import textwrap
+
+    letters = max(int(width * LETTERS[_CURRENT.get().titles]), 8)
+    return "\n".join(textwrap.fill(line, letters) for line in text.split("\n"))
+
+
+def new_figure(width: float, height: float, *, rigid: bool = False, page: bool = False) -> Figure:
+    """Figure of `width` x `height` inches that belongs to no window; of the style's width where it has one, of two columns for a `page`.
+
+    Then it is lower, too: by as much if `rigid`, else by less, as labels keep their height.
+    """
     from matplotlib.figure import Figure
 
+    own = _CURRENT.get().width
+    if page and own is not None:
+        own = STYLES["paper-wide"].width
+    if own is not None:
+        ratio = own / width
+        height = min(height * (ratio if rigid else min(ratio, 1.0) ** 0.6), HIGHEST)
+        width = own
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -129,7 +226,11 @@ def save(figure: Figure, path: Path, dpi: float) -> None:
     Raises ResultsError if that is not possible.
     """
     ending = path.suffix.lower()
-    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[ending]
+    metadata: dict[str, Any] = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[
+        ending
+    ]
+    if caption(figure):
+        metadata["Title"] = caption(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         try:
@@ -140,11 +241,37 @@ def save(figure: Figure, path: Path, dpi: float) -> None:
 
 def heading(figure: Figure, results: Results, text: str) -> None:
     """Title of the picture: the run's own title, then `text`; says so if the run is incomplete."""
-    import textwrap
-
-    lines = textwrap.wrap(results.title, int(11.5 * figure.get_figwidth())) or [results.path.name]
     note = "" if results.complete else " - incomplete run"
-    figure.suptitle("\n".join([*lines, text + note]), parse_math=False)
+    title(figure, text + note, results.title or results.path.name)
+
+
+def title(figure: Figure, text: str, name: str = "") -> None:
+    """`text` below the name of the run: over the picture, or in its caption where the style has no titles."""
+    describe(figure, f"{name}: {text}" if name else text)
+    if _CURRENT.get().titles:
+        figure.suptitle(wrapped(f"{name}\n{text}" if name else text, figure.get_figwidth()), parse_math=False)
+
+
+def footnote(figure: Figure, text: str, size: float | None = None) -> None:
+    """What else must be known: small (`size` points), under the picture, or in its caption where the style has no titles."""
+    describe(figure, text)
+    if _CURRENT.get().titles:
+        import textwrap
+
+        size = size or small()
+        wide = int(115.0 * figure.get_figwidth() / size)
+        figure.supxlabel("\n".join(textwrap.fill(line, wide) for line in text.split("\n")), fontsize=size)
+
+
+def caption(figure: Figure) -> str:
+    """Title and notes of the picture in one line."""
+    return str(figure.get_label())
+
+
+def describe(figure: Figure, text: str) -> None:
+    """Add a part to the caption."""
+    one = text.replace("\n", "; ")
+    figure.set_label(f"{caption(figure)}; {one}" if caption(figure) else one)
 
 
 def axis_name(results: Results) -> str:
@@ -178,8 +305,9 @@ def mark_stages(axes: Sequence[Axes], stages: Sequence[Stage], end: float) -> No
                 ax.axvspan(stage.start, stop, color="0.93", zorder=0, linewidth=0)
         share = (stop - stage.start) / max(end - start, 1e-300)
         text = f"{number} {stage.name or stage.kind}"
-        if share < 0.015 * len(text):
-            text = str(number) if share > 0.02 else ""
+        wide = 7.0 / (current().width or 7.0)
+        if share < 0.015 * wide * len(text):
+            text = str(number) if share > 0.02 * wide else ""
         where = offset_copy(axes[0].get_xaxis_transform(), axes[0].get_figure(root=True), y=2.0, units="points")
         axes[0].text(
             0.5 * (stage.start + stop),
@@ -188,7 +316,7 @@ def mark_stages(axes: Sequence[Axes], stages: Sequence[Stage], end: float) -> No
             transform=where,
             ha="center",
             va="bottom",
-            fontsize=8,
+            fontsize=small(),
             color="0.35",
             parse_math=False,
         )

@@ -115,6 +115,7 @@ def draw_motion(results: Results, window: tuple[float, float], text: str) -> Fig
     within = [s for s in results.stages if s.start < window[1] - 1e-9 and not s.end <= window[0] + 1e-9]
     if len(within) > 1:
         mark_stages(list(panels), results.stages, window[1])
+    figure.align_ylabels()
     heading(figure, results, f"Motion of the container, {text}")
     return figure
 

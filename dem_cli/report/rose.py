@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, heading, new_figure, place_text, stage_label
+from dem_cli.report.look import COLORS, footnote, heading, narrow, new_figure, place_text, stage_label
 from dem_cli.results import Results
 from dem_cli.state import Floats
 
@@ -38,7 +38,7 @@ def draw_rose(results: Results, index: int) -> Figure:
     large = float(np.arctan2(directions[1, 1], directions[0, 1]))
     large -= np.pi * np.floor(large / np.pi + 0.5)  # an axis: -90 to 90 deg
 
-    figure = new_figure(4.8, 5.2)
+    figure = new_figure(4.8, 5.2, rigid=narrow())
     ax: PolarAxes = figure.add_subplot(projection="polar")  # type: ignore[assignment]
     middle = (np.arange(SECTORS) + 0.5) * 2.0 * np.pi / SECTORS
     ax.bar(middle, density, width=2.0 * np.pi / SECTORS, color=COLORS[4], edgecolor="white", linewidth=0.5)
@@ -56,10 +56,10 @@ def draw_rose(results: Results, index: int) -> Figure:
     if 0 <= frame.stage < len(results.stages):
         text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
     heading(figure, results, f"Contact normals between grains, {text}")
-    figure.supxlabel(
+    footnote(
+        figure,
         f"{n.shape[1]} contacts; fabric {values[1]:.3f} at {np.degrees(large):.0f} deg, {values[0]:.3f} across\n"
         "1 is the same in all directions; line: what the fabric alone tells",
-        fontsize=8,
     )
     return figure
 

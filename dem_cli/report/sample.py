@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,15 +14,18 @@ from dem_cli.report.look import (
     SEQUENTIAL,
     Extend,
     axis_label,
+    current,
     display_unit,
     extension,
+    footnote,
     heading,
     largest,
+    narrow,
     new_figure,
     place_text,
     stage_label,
 )
-from dem_cli.report.moments import BOUNDARY, AnyFrame, frame_box, frames_of_stage
+from dem_cli.report.moments import BOUNDARY, AnyFrame, Box, frame_box, frames_of_stage
 from dem_cli.report.quantities import QUANTITIES, Quantity
 from dem_cli.report.strokes import (
     EDGE,
@@ -37,6 +41,7 @@ from dem_cli.state import Bools, Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Colormap, Normalize
     from matplotlib.figure import Figure
 
@@ -50,36 +55,83 @@ UNDEFINED = {"cyclic": "0.65"}
 SMALL_RADIUS = 1.5
 
 
-def draw_sample(
-    results: Results,
-    index: int,
-    *,
-    color: str = "displacement",
-    chains: bool | None = None,
-    bonds: bool | None = None,
-    marks: bool = False,
-    limits: tuple[float, float] | None = None,
-) -> Figure:
-    """Frame `index`, grains coloured by QUANTITIES[color]; `limits` of the colours in SI units (rotation:
-    rad).
+@dataclass(frozen=True)
+class Look:
+    """What is drawn, and how: color of QUANTITIES, `limits` of the colours in SI units (rotation: rad), None as the values ask.
 
-    Displacement and rotation count from the first frame of the frame's stage. Escaped grains are left out. chains, bonds: lines as wide
-    as the normal force, bars between elements of a grain; None: where grains are large enough. marks: a radius or half axis of
-    each element.
+    chains, bonds: lines as wide as the normal force, bars between elements of a grain; None: where grains are large enough. marks: a
+    radius or half axis of each element.
     """
+
+    color: str = "displacement"
+    chains: bool | None = None
+    bonds: bool | None = None
+    marks: bool = False
+    limits: tuple[float, float] | None = None
+
+    @property
+    def quantity(self) -> Quantity:
+        return QUANTITIES[self.color]
+
+
+@dataclass(frozen=True)
+class Sight:
+    """The scales of a picture, or of all pictures of a film. box: x0, x1, y0, y1 [m]; colors; widest: normal force [N] of the widest line."""
+
+    box: Box
+    colors: Colors
+    widest: float
+
+    @property
+    def factor(self) -> float:
+        """Unit of the axes [m]."""
+        return display_unit("m", max(self.box[1] - self.box[0], self.box[3] - self.box[2]))[0]
+
+
+def draw_sample(results: Results, index: int, look: Look) -> Figure:
+    """Frame `index`. Displacement and rotation count from the first frame of the frame's stage. Escaped grains are left out."""
     frame = results.frame(index)
-    quantity = QUANTITIES[color]
-    begin = frame
-    if quantity.since:
-        first = first_frame_of_stage(results, frame.stage)
-        begin = frame if first == index else results.frame(first)
+    begin = begin_of(results, index, frame) if look.quantity.since else frame
     shown = ~frame.grains.escaped
+    values = values_of(results, frame, begin, look.quantity)[shown]
+    forces = np.zeros(0) if frame.contacts is None else frame.contacts.normal
+    box = view(results, frame)
+    sight = Sight(box, colors_of(values, look, bounded=bool(results.boundary)), widest_of(forces))
+    figure, ax = stage_set(sight, look)
+    caption = paint(ax, results, frame, values, look, sight)
+    heading(figure, results, text_of(results, index, frame))
+    if caption:
+        footnote(figure, caption)
+    return figure
+
+
+def text_of(results: Results, index: int, frame: AnyFrame) -> str:
+    """When it is, and in which stage."""
+    text = place_text(results, index)
+    if 0 <= frame.stage < len(results.stages):
+        text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
+    return text
+
+
+def values_of(results: Results, frame: AnyFrame, begin: AnyFrame, quantity: Quantity) -> Floats:
+    """Of all elements, SI units; NaN of boundary grains. begin: the frame that its stage starts from."""
     values = np.array(quantity.values(frame, begin), dtype=float)  # a copy: what follows changes it
     if results.boundary:
         values[-results.boundary :] = np.nan
-    values = values[shown]
+    return values
 
-    box = _view(results, frame, shown)
+
+def begin_of(results: Results, index: int, frame: AnyFrame) -> AnyFrame:
+    """The frame that the stage of frame `index` starts from."""
+    first = first_frame_of_stage(results, frame.stage)
+    return frame if first == index else results.frame(first)
+
+
+def stage_set(sight: Sight, look: Look) -> tuple[Figure, Axes]:
+    """A figure with empty axes and the colour bar."""
+    from matplotlib.cm import ScalarMappable
+
+    box = sight.box
     factor, unit = display_unit("m", max(box[1] - box[0], box[3] - box[2]))
     figure = new_figure(*_size(box))
     ax = figure.add_subplot()
@@ -89,24 +141,26 @@ def draw_sample(
     ax.set_ylim(box[2] / factor, box[3] / factor)
     ax.set_xlabel(axis_label("x", unit))
     ax.set_ylabel(axis_label("y", unit))
-    _draw_grains(ax, frame, shown, values, quantity, factor, limits, BOUNDARY if results.boundary else None)
-    points = _points_per_meter(box)
+    if look.quantity.kind != "label":
+        _draw_bar(ax, ScalarMappable(sight.colors.norm, sight.colors.cmap), look.quantity, sight.colors)
+    return figure, ax
+
+
+def paint(ax: Axes, results: Results, frame: AnyFrame, values: Floats, look: Look, sight: Sight) -> str:
+    """Grains, bonds, chains, marks and walls of a frame; values: of the grains that are shown. Returns the caption of the chains."""
+    shown, factor = ~frame.grains.escaped, sight.factor
+    _draw_grains(ax, frame, shown, values, look.quantity, sight)
+    points = _points_per_meter(sight.box)
     radius = float(np.mean(frame.grains.radius)) * points
-    if bonds or (bonds is None and radius >= SMALL_RADIUS):
+    large = radius >= SMALL_RADIUS
+    if large if look.bonds is None else look.bonds:
         draw_bonds(ax, frame.grains, results.bonds, shown, factor, radius)
-    if chains is None:
-        chains = radius >= SMALL_RADIUS
-    caption = _draw_chains(ax, frame, factor, points) if chains else ""
-    if marks:
+    chains = large if look.chains is None else look.chains
+    caption = _draw_chains(ax, frame, factor, points, sight.widest) if chains else ""
+    if look.marks:
         draw_marks(ax, frame.grains.take(shown), factor, radius)
-    _draw_walls(ax, frame, box, factor)
-    text = place_text(results, index)
-    if 0 <= frame.stage < len(results.stages):
-        text += f", {stage_label(frame.stage + 1, results.stages[frame.stage])}"
-    heading(figure, results, text)
-    if caption:
-        figure.supxlabel(caption, fontsize=8)
-    return figure
+    _draw_walls(ax, frame, sight.box, factor)
+    return caption
 
 
 def first_frame_of_stage(results: Results, stage: int) -> int:
@@ -118,11 +172,11 @@ def first_frame_of_stage(results: Results, stage: int) -> int:
     return int(np.argmin(np.abs(results.frame_times - results.stages[stage].start)))
 
 
-def _view(results: Results, frame: AnyFrame, shown: Bools) -> tuple[float, float, float, float]:
+def view(results: Results, frame: AnyFrame) -> Box:
     """What is drawn (x0, x1, y0, y1) [m]: the container up to the highest grain, with its top if that is
     near.
     """
-    g = frame.grains
+    g, shown = frame.grains, ~frame.grains.escaped
     wide, high = bodies.reach(g)
     right = max(results.width, float(np.max((g.x + wide)[shown], initial=0.0)))
     left = min(0.0, float(np.min((g.x - wide)[shown], initial=0.0)))
@@ -140,38 +194,56 @@ def _view(results: Results, frame: AnyFrame, shown: Bools) -> tuple[float, float
 def _size(box: tuple[float, float, float, float]) -> tuple[float, float]:
     """Figure size [inch] that fits the view, with room for axes and colour bar."""
     aspect = (box[3] - box[2]) / (box[1] - box[0])
-    width = min(6.0, 8.0 / aspect)
-    return max(width, 2.6) + 1.5, min(max(width * aspect, 1.6), 8.0) + 1.3
+    beside, above = _room()
+    own = current().width
+    width = min(6.0 if own is None else own - beside, 8.0 / aspect)
+    return max(width, 2.6) + beside if own is None else own, min(max(width * aspect, 1.6), 8.0) + above
+
+
+def _room() -> tuple[float, float]:
+    """What axes, colour bar and titles take of the figure's width and height [inch]."""
+    return (1.5, 1.3) if current().titles else (0.55, 0.95) if narrow() else (1.1, 0.45)
 
 
 def _points_per_meter(box: tuple[float, float, float, float]) -> float:
-    width, _ = _size(box)
-    return 72.0 * (width - 1.5) / (box[1] - box[0])
+    wide, high = (size - room for size, room in zip(_size(box), _room(), strict=True))
+    return (
+        72.0
+        * (wide if current().width is None else min(wide, high * (box[1] - box[0]) / (box[3] - box[2])))
+        / (box[1] - box[0])
+    )
 
 
-def _draw_grains(
-    ax: Axes,
-    frame: AnyFrame,
-    shown: Bools,
-    values: Floats,
-    quantity: Quantity,
-    factor: float,
-    limits: tuple[float, float] | None,
-    undefined: str | None = None,
-) -> None:
-    """undefined: colour of grains without a value, boundary grains among them."""
-    from matplotlib.collections import EllipseCollection
+@dataclass(frozen=True)
+class Colors:
+    """How values become colours: scale: SI value of the unit; arrows of the colour bar."""
 
-    grains = frame.grains.take(shown)
+    scale: float
+    unit: str
+    norm: Normalize
+    cmap: Colormap
+    extend: Extend
+
+
+def colors_of(values: Floats, look: Look, *, bounded: bool = False) -> Colors:
+    """For `values` (SI units) of one frame, or of many. bounded: there are boundary grains, which have a colour of their own."""
+    quantity, limits = look.quantity, look.limits
     finite = values[np.isfinite(values)]
     if quantity.kind == "label":
-        values = finite = values % len(PALETTE)
+        finite = finite % len(PALETTE)
     scale, unit = display_unit(quantity.unit, largest(finite) if limits is None else largest(np.array(limits)))
-    norm, cmap, extend = value_colors(
-        finite / scale, quantity.kind, None if limits is None else np.array(limits) / scale
-    )
-    if undefined is not None:
-        cmap = cmap.with_extremes(bad=undefined)
+    ends = None if limits is None else np.array(limits) / scale
+    norm, cmap, extend = value_colors(finite / scale, quantity.kind, ends)
+    return Colors(scale, unit, norm, cmap.with_extremes(bad=BOUNDARY) if bounded else cmap, extend)
+
+
+def _draw_grains(ax: Axes, frame: AnyFrame, shown: Bools, values: Floats, quantity: Quantity, sight: Sight) -> None:
+    """values: of the grains that are shown; those without one, boundary grains among them, have the map's colour for bad ones."""
+    from matplotlib.collections import EllipseCollection
+
+    grains, factor, colors = frame.grains.take(shown), sight.factor, sight.colors
+    if quantity.kind == "label":
+        values = values % len(PALETTE)
     edges = grains.grain_count <= MOST_EDGES
     widths = np.full(len(grains), EDGE_WIDTH if edges else 0.0)
     widths[bodies.several(grains)] = 0.0
@@ -182,9 +254,9 @@ def _draw_grains(
         units="x",
         offsets=np.column_stack([grains.x, grains.y]) / factor,
         offset_transform=ax.transData,
-        array=np.ma.masked_invalid(values / scale),
-        cmap=cmap,
-        norm=norm,
+        array=np.ma.masked_invalid(values / colors.scale),
+        cmap=colors.cmap,
+        norm=colors.norm,
         linewidths=widths,
         edgecolors=EDGE if edges else "none",
         rasterized=len(grains) > RASTER_ABOVE,
@@ -192,16 +264,19 @@ def _draw_grains(
     ax.add_collection(ellipses)
     if edges:
         draw_outlines(ax, grains, factor)
-    if quantity.kind == "label":
-        return
-    bar = ax.figure.colorbar(ellipses, ax=ax, extend=extend, aspect=28, pad=0.02)
+
+
+def _draw_bar(ax: Axes, mappable: ScalarMappable, quantity: Quantity, colors: Colors) -> None:
+    # In a column of a page the label is longer than a low picture is high.
+    place: Any = {"location": "bottom", "aspect": 40, "shrink": 0.9} if narrow() else {"aspect": 28, "pad": 0.02}
+    bar = ax.figure.colorbar(mappable, ax=ax, extend=colors.extend, **place)
     label = quantity.label + (" since the stage began" if quantity.since else "")
-    bar.set_label(axis_label(label, unit))
+    bar.set_label(axis_label(label, colors.unit))
     bar.outline.set_linewidth(0.5)
     if quantity.kind == "cyclic":
         bar.set_ticks([-90, -45, 0, 45, 90])
     if quantity.kind == "count":
-        low, high = int(np.ceil(norm.vmin or 0.0)), int(np.floor(norm.vmax or 0.0))
+        low, high = int(np.ceil(colors.norm.vmin or 0.0)), int(np.floor(colors.norm.vmax or 0.0))
         bar.set_ticks(list(range(low, high + 1, max(1, (high - low) // 8))))
 
 
@@ -240,10 +315,15 @@ def value_colors(values: Floats, kind: str, limits: Floats | None) -> tuple[Norm
     return Normalize(low, high), cmap, extend
 
 
-def _draw_chains(ax: Axes, frame: AnyFrame, factor: float, points_per_meter: float) -> str:
+def widest_of(forces: Floats) -> float:
+    """Normal force [N] of the widest line."""
+    return float(np.percentile(forces, 99.5)) if len(forces) else 0.0
+
+
+def _draw_chains(ax: Axes, frame: AnyFrame, factor: float, points_per_meter: float, widest: float) -> str:
     """Lines from centre to centre of the grains (or to the wall), as wide as the normal force is large. Returns their caption.
 
-    The 99.5th percentile is as wide as half a mean grain; forces below a fiftieth of it are left out, and where
+    `widest` [N], the 99.5th percentile, is as wide as half a mean grain; forces below a fiftieth of it are left out, and where
     grains are drawn too small for a line to have an edge, those below the mean.
     """
     c = frame.contacts
@@ -252,7 +332,6 @@ def _draw_chains(ax: Axes, frame: AnyFrame, factor: float, points_per_meter: flo
     g = frame.grains
     radius = float(np.mean(g.radius)) * points_per_meter
     small = radius < SMALL_RADIUS
-    widest = float(np.percentile(c.normal, 99.5))
     keep = c.normal > (float(c.normal.mean()) if small else 0.02 * widest)
     if widest <= 0.0 or not keep.any():
         return ""

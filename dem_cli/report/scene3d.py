@@ -12,7 +12,17 @@ import numpy as np
 from dem_cli.analysis.placed import by_shape, extent
 from dem_cli.report.body_quantities import BODY_QUANTITIES, BodyQuantity
 from dem_cli.report.camera import DEFAULT_VIEW, Camera, Paint, faces, strokes
-from dem_cli.report.look import axis_label, display_unit, heading, largest, new_figure, place_text, stage_label
+from dem_cli.report.look import (
+    axis_label,
+    display_unit,
+    footnote,
+    heading,
+    largest,
+    new_figure,
+    place_text,
+    small,
+    stage_label,
+)
 from dem_cli.report.pieces import draw_planes, lowered
 from dem_cli.report.sample import PALETTE, first_frame_of_stage, value_colors
 from dem_cli.report.solids import solid_of, subdivided
@@ -89,7 +99,7 @@ def draw_scene(
     heading(figure, results, text)
     if any(notes):
         caption = textwrap.fill("; ".join(note for note in notes if note), int(14.0 * figure.get_figwidth()))
-        figure.supxlabel(caption, fontsize=8)
+        footnote(figure, caption)
     return figure
 
 
@@ -184,7 +194,7 @@ def _body_colors(
             bar.set_ticks(list(range(lowest, highest + 1, max(1, (highest - lowest) // 8))))
     elif quantity is BODY_QUANTITIES["kind"] and len(results.groups) > 1:
         handles = [Patch(color=PALETTE[k % len(PALETTE)], label=name) for k, name in enumerate(results.groups)]
-        ax.legend(handles=handles, loc="upper right", fontsize=8)
+        ax.legend(handles=handles, loc="upper right", fontsize=small())
     return np.asarray(mapped.to_rgba(np.ma.masked_invalid(values)), dtype=float)[:, :3]
 
 
@@ -267,7 +277,9 @@ def _draw_axes(ax: Axes, view: View) -> None:
         ax.annotate(
             "", (float(end[0]), float(end[1])), (float(origin[0]), float(origin[1])), arrowprops=arrow, zorder=5
         )
-        ax.text(float(place[0]), float(place[1]), name, fontsize=8, ha="center", va="center", color="0.2", zorder=5)
+        ax.text(
+            float(place[0]), float(place[1]), name, fontsize=small(), ha="center", va="center", color="0.2", zorder=5
+        )
 
 
 def _draw_chains(ax: Axes, frame: StoredBodyFrame, shown: Bools, view: View) -> str:

@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dem_cli.report.look import COLORS, heading, new_figure, stage_label
+from dem_cli.report.look import COLORS, footnote, heading, new_figure, stage_label, title
 from dem_cli.report.shear_rows import (
+    SLOPE_ROWS,
     Rows,
     densities,
+    dilatancy,
     is_undrained,
     one_shear_stage,
     principal,
@@ -127,6 +129,27 @@ def panel_volume(ax: Axes, some: Sequence[Curve]) -> None:
     ax.set(xlabel=STRAIN, ylabel="volumetric strain e_v [%]")
 
 
+def panel_dilatancy(ax: Axes, one: Curve) -> None:
+    """Rate of dilatancy -de_v/d(e1 - e2), the sine of the dilatancy angle in 2D, over the shear strain; the angle on the right."""
+    rate = dilatancy(one.rows)
+    ax.plot(one.along, rate, color=one.colour)
+    mark_peak(ax, one.along, rate, one.peak)
+    mark_events(ax, one.along, one.rows)
+    ax.axhline(0.0, color="0.6", lw=0.6, zorder=0)
+    ax.set(xlabel=_label([one]), ylabel="dilatancy -de_v/d(e1 - e2)")
+    right = ax.secondary_yaxis("right", functions=(_angle, _sine_of))  # type: ignore[arg-type]
+    right.set_ylabel("dilatancy angle [deg]")
+    ax.spines["right"].set_visible(True)
+
+
+def _angle(sine: Floats) -> Floats:
+    return np.asarray(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
+
+
+def _sine_of(angle: Floats) -> Floats:
+    return np.asarray(np.sin(np.radians(angle)))
+
+
 def panel_deviator(ax: Axes, some: Sequence[Curve]) -> None:
     for one in some:
         y = 1e-3 * one.rows["deviator"]
@@ -180,13 +203,13 @@ def panel_energy(ax: Axes, one: Curve) -> None:
 
 
 def _principal(ax: Axes, one: Curve, values: tuple[Floats, Floats], letter: str) -> None:
-    found = (
-        (f"{letter}1 + {letter}2", values[0] + values[1], "black"),
-        (f"{letter}1", values[0], COLORS[1]),
-        (f"{letter}2", values[1], COLORS[0]),
+    found: tuple[tuple[str, Floats, str, Any], ...] = (
+        (f"{letter}1 + {letter}2", values[0] + values[1], "black", "-"),
+        (f"{letter}1", values[0], COLORS[1], (0, (5, 1.5))),
+        (f"{letter}2", values[1], COLORS[0], "-"),
     )
-    for label, y, colour in found:
-        ax.plot(one.along, y, color=colour, label=label)
+    for label, y, colour, dash in found:
+        ax.plot(one.along, y, color=colour, ls=dash, label=label)
         mark_peak(ax, one.along, y, one.peak)
     ax.set_xlabel(_label([one]))
     name_lines(ax)
@@ -195,13 +218,13 @@ def _principal(ax: Axes, one: Curve, values: tuple[Floats, Floats], letter: str)
 def panel_dissipation(ax: Axes, one: Curve, depth: float) -> None:
     """Work, dissipation and elastic energy since the stage began over the sample's volume, as in figure 15; what collapses released."""
     found = densities(one.rows, depth)
-    lines = [
+    lines: list[tuple[str, str, str, Any]] = [
         ("work W", "work", "black", "-"),
-        ("friction D", "friction", COLORS[1], "-"),
+        ("friction D", "friction", COLORS[1], (0, (5, 1.5))),
         ("elastic", "elastic", COLORS[0], "-"),
     ]
     if np.abs(found["released"]).max() > 1e-3 * max(np.abs(found["work"]).max(), 1e-300):
-        lines.append(("released", "released", COLORS[2], (0, (4, 2))))  # type: ignore[arg-type]
+        lines.append(("released", "released", COLORS[2], (0, (1, 1))))
     for label, name, colour, dash in lines:
         ax.plot(one.along, found[name], color=colour, ls=dash, label=label)
         if name in ("work", "friction"):
@@ -302,7 +325,7 @@ def draw_compared(several: Sequence[Results], number: int | None) -> Figure:
         for k, one in enumerate(several)
     ]
     figure = _stress_figure(some)
-    figure.suptitle(f"Stress and strain of {len(some)} tests{_peaks(some)}")
+    title(figure, f"Stress and strain of {len(some)} tests{_peaks(some)}")
     return figure
 
 
@@ -340,17 +363,20 @@ def _stage_text(results: Results, number: int | None) -> str:
 
 
 def draw_one(results: Results, what: str, number: int | None) -> Figure:
-    """Figure of one panel about one stage: coordination, energy-tensor, dissipation or largest-share."""
+    """Figure of one panel about one stage: dilatancy, coordination, energy-tensor, dissipation or largest-share."""
     one = curve(results, one_shear_stage(results, number))
     figure = new_figure(5.6, 4.0)
     ax = figure.add_subplot()
     titles = {
+        "dilatancy": "Dilatancy",
         "coordination": "Coordination tensor",
         "energy-tensor": "Tensor of elastic energy",
         "dissipation": "Work, dissipation and elastic energy since the start",
         "largest-share": "Share of the contact that dissipates most",
     }
-    if what == "coordination":
+    if what == "dilatancy":
+        panel_dilatancy(ax, one)
+    elif what == "coordination":
         panel_coordination(ax, one)
     elif what == "energy-tensor":
         panel_energy(ax, one)
@@ -360,8 +386,10 @@ def draw_one(results: Results, what: str, number: int | None) -> Figure:
         panel_share(ax, one)
     heading(figure, results, f"{titles[what]}, {_stage_text(results, number)}")
     notes = ["dots: peak of s1/s2"] if one.peak is not None else []
-    if what in ("dissipation", "largest-share") and np.any(one.rows["event"] > 0):
+    if what == "dilatancy":
+        notes.append(f"slope over {2 * SLOPE_ROWS + 1} increments")
+    if what in ("dilatancy", "dissipation", "largest-share") and np.any(one.rows["event"] > 0):
         notes.append("strokes: increments that passed through a collapse")
     if notes:
-        figure.supxlabel("; ".join(notes), fontsize=8)
+        footnote(figure, "; ".join(notes))
     return figure

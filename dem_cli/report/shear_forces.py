@@ -9,7 +9,17 @@ import numpy as np
 
 from dem_cli.analysis.quasi_static import SECTORS, contact_energy, contact_rose, energy_rose, force_carrying, halves
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, axis_label, display_unit, heading, new_figure, stage_label
+from dem_cli.report.look import (
+    COLORS,
+    axis_label,
+    display_unit,
+    folded,
+    footnote,
+    heading,
+    narrow,
+    new_figure,
+    stage_label,
+)
 from dem_cli.report.moments import BOUNDARY, frame_box, frames_of_stage
 from dem_cli.report.shear_rows import one_shear_stage, shown_peak, stage_rows
 from dem_cli.results import Results, StoredIncrement
@@ -80,15 +90,15 @@ def draw_forces(results: Results, moments: list[Moment], text: str) -> Figure:
     views = [frame_box(one.frame) for one in moments]
     wide, high = max(v[1] - v[0] for v in views), max(v[3] - v[2] for v in views)
     size = 4.4 if len(moments) > 1 else 6.0
-    figure = new_figure(size * len(moments), min(size * high / wide, 9.0) + 1.1)
+    figure = new_figure(size * len(moments), min(size * high / wide, 9.0) + 1.1, rigid=narrow())
     axes = np.atleast_1d(figure.subplots(1, len(moments)))
     largest = largest_force([one.frame for one in moments])
     boundary = results.boundary
     for ax, one in zip(axes, moments, strict=True):
         panel_forces(ax, one.frame, largest, boundary, (wide, high))
-        ax.set_title(one.text)
+        ax.set_title(folded(one.text))
     heading(figure, results, f"Contact forces, {text}" if text else "Contact forces")
-    figure.supxlabel(force_note(largest, boundary), fontsize=8)
+    footnote(figure, force_note(largest, boundary))
     return figure
 
 
@@ -198,7 +208,8 @@ def panel_rose(ax: PolarAxes, values: Floats, top: float, before: Floats | None 
             np.append(edges, edges[0] + 2.0 * np.pi), np.append(steps, steps[0]), color="black", lw=0.7, label="before"
         )
     ax.set_ylim(0.0, top)
-    step = next((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if top / s <= 4.5), 25.0)
+    most = 2.5 if small or narrow() else 4.5
+    step = next((s for s in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if top / s <= most), 25.0)
     ticks = np.arange(step, top, step)
     ax.set_yticks(ticks.tolist(), [f"{tick:g} %" for tick in ticks], fontsize=5.5 if small else 6.5)
     ax.set_rlabel_position(22.5)
@@ -215,14 +226,14 @@ def draw_roses(results: Results, moments: list[Moment], text: str, *, energy: bo
             f"{results.path}: nothing touches in the frames that are asked for; choose another --increment"
         )
     top = 1.08 * max(float(np.nanmax(values, initial=0.0)) for values in found)
-    figure = new_figure(3.9 * len(moments) if len(moments) > 1 else 4.8, 5.5)
+    figure = new_figure(3.9 * len(moments) if len(moments) > 1 else 4.8, 5.5, rigid=narrow())
     for k, (one, values) in enumerate(zip(moments, found, strict=True)):
         ax: PolarAxes = figure.add_subplot(1, len(moments), k + 1, projection="polar")  # type: ignore[assignment]
         panel_rose(ax, values, top, found[0] if k else None)
-        ax.set_title(one.text, pad=10)
+        ax.set_title(folded(one.text), pad=10)
         ax.set_xlabel(within_text(one.frame, axial, energy=energy), labelpad=8)
     what = "Elastic energy in the direction of contact normals" if energy else "Contact normals"
     heading(figure, results, f"{what}, {text}")
     note = "percent of the whole in sectors of 10°; contacts with walls count half"
-    figure.supxlabel(note + ("\nline: at the start" if len(moments) > 1 else ""), fontsize=8)
+    footnote(figure, note + ("\nline: at the start" if len(moments) > 1 else ""))
     return figure

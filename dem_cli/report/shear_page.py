@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, heading, new_figure
+from dem_cli.report.look import COLORS, footnote, heading, narrow, new_figure
 from dem_cli.report.moments import frame_box
 from dem_cli.report.shear_curves import (
     Curve,
@@ -138,11 +138,11 @@ def draw_ranked(results: Results, number: int | None) -> Figure:
     axes = figure.subplots(2, 2, sharex=True, sharey=True)
     _ranked(list(axes.ravel()), panels)
     for ax in axes[-1]:
-        ax.set_xlabel("share P in the dissipation [%]")
+        ax.set_xlabel("share P [%]" if narrow() else "share P in the dissipation [%]")
     for ax in axes[:, 0]:
         ax.set_ylabel("contacts with share P or more")
     heading(figure, results, f"Ranked dissipation, {stage_text(results, number)}")
-    figure.supxlabel("dashed: straight line of best fit of the first increment", fontsize=8)
+    footnote(figure, "dashed: straight line of best fit of the first increment")
     return figure
 
 
@@ -171,7 +171,7 @@ def draw_page(results: Results, number: int | None) -> Figure:
 def _page(results: Results, number: int | None) -> Figure:
     one = curve(results, one_shear_stage(results, number))
     moments = start_and_peak(results, number)
-    figure = new_figure(8.27, 11.69)
+    figure = new_figure(8.27, 11.69, rigid=True, page=True)
     rows = figure.add_gridspec(6, 1, height_ratios=[3.0, 1.75, 1.6, 1.65, 1.65, 1.4])
     boundary = results.boundary
     frames = [m.frame for m in moments]
@@ -206,7 +206,7 @@ def _page(results: Results, number: int | None) -> Figure:
         force_note(largest, boundary)
         + "; dots: peak of s1/s2; strokes: collapses\nroses: percent in sectors of 10°, contacts with walls count half"
     )
-    figure.supxlabel(note, fontsize=6.5)
+    footnote(figure, note, 6.5)
     return figure
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from dem_cli.results import Results
 
 Rows = dict[str, Floats]
+SLOPE_ROWS = 3  # rows on either side over which a slope is taken, as single increments are noisy
 SHEARS = ("shear", "load", "cyclic")  # kinds of stages that shear the sample
 
 
@@ -146,3 +147,18 @@ def half_cycles(rows: Rows) -> list[tuple[int, int]]:
 def _or(names: Iterable[str]) -> str:
     *most, last = names
     return f"{', '.join(most)} or {last}" if most else last
+
+
+def dilatancy(rows: Rows) -> Floats:
+    """-de_v/d(e1 - e2) at each row: slope of the straight line of best fit over SLOPE_ROWS rows before and after it; NaN where nothing is
+    sheared.
+    """
+    x, y = rows["shear_strain"], rows["volumetric_strain"]
+    found = np.full(len(x), np.nan)
+    for k in range(len(x)):
+        part = slice(max(k - SLOPE_ROWS, 0), k + SLOPE_ROWS + 1)
+        dx = x[part] - x[part].mean()
+        squares = float(dx @ dx)
+        if squares > 0.0:
+            found[k] = -float(dx @ y[part]) / squares
+    return found

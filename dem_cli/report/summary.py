@@ -254,11 +254,14 @@ def _stage(results: Results, run: Run, number: int, stage: Stage) -> StageSummar
         bond_gap_largest=peak("bond_gap") if run.bonds else math.nan,
         bond_slip_largest=peak("bond_slip") if run.bonds else math.nan,
         bond_roll_largest=peak("bond_roll") if run.bonds else math.nan,
-        sloshing=_sloshing(results, number, before["depth"], run.mean_radius) if stage.kind == "shake" else None,
+        sloshing=sloshing_of(results, number) if stage.kind == "shake" else None,
     )
 
 
-def _sloshing(results: Results, number: int, depth: float, mean_radius: float) -> Sloshing:
+def sloshing_of(results: Results, number: int) -> Sloshing:
+    """Of stage `number` (from 1)."""
+    depth = float(results.stages[number - 1].before.get("depth", math.nan))
+    mean_radius = _mean_radius(results, results.frame(0).grains) if results.n_frames else math.nan
     container = results.scenario.get("container", {})
     gravity = _quantity(container, "gravity", "m/s^2")
     direction = _quantity(container, "gravity_direction", "rad")

@@ -10,7 +10,8 @@ import numpy as np
 
 from dem_cli.analysis.statistics import LEVEL, Estimate
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import DIVERGING, SEQUENTIAL, new_figure
+from dem_cli.report import look
+from dem_cli.report.look import DIVERGING, SEQUENTIAL, narrow, new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
 from dem_cli.report.sweep_best import best_point, lines
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
+MOST_WORDY = 3  # columns of a map as wide as a column of a page, beyond which cells hold the mean alone
 DARK = 0.5  # luminance below which a cell's text is white
 
 Cells = Mapping[tuple[int, int], SweepCase]
@@ -64,7 +66,7 @@ def draw_map(found: Sweep) -> tuple[str, str, Figure]:
         mark = "Ringed"
     if best:
         caption += f" {mark}: the best point. {said}"
-    figure.suptitle(title, parse_math=False)
+    look.title(figure, title)
     return title, caption, figure
 
 
@@ -97,7 +99,7 @@ def _matrices(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
     elif high - low < 1e-12:
         low, high = low - 1e-6, high + 1e-6
     norm = Normalize(low, high)
-    wide = min(len(panels), max(1, int(12.0 / (1.3 + 0.95 * len(columns)))), 3)
+    wide = 1 if narrow() else min(len(panels), max(1, int(12.0 / (1.3 + 0.95 * len(columns)))), 3)
     tall = -(-len(panels) // wide)
     figure = new_figure(max(wide * (0.9 + 0.95 * len(columns)) + 1.3, 4.6), tall * (0.9 + 0.62 * len(rows)) + 0.7)
     grid = figure.subplots(tall, wide, squeeze=False)
@@ -169,10 +171,12 @@ def _write_cells(
         else:
             _hatch(ax, row, column)
             pad = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+        if narrow() and shape[1] > MOST_WORDY:
+            text = text.split("\n")[0]
         if best == (row, column):
             _frame(ax, best)
             text += "\nbest"
-        ax.text(column, row, text, ha="center", va="center", fontsize=7.5, color=color, bbox=pad)
+        ax.text(column, row, text, ha="center", va="center", fontsize=6.5 if narrow() else 7.5, color=color, bbox=pad)
 
 
 def cell_text(case: SweepCase | None, value: Estimate | None, measure: Measure) -> str:

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from dem_cli.errors import ScenarioError
+from dem_cli.report import look
 from dem_cli.report.look import new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import Axis
@@ -67,7 +68,7 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
     _periods(bottom, ratios)
     legend_below(figure, top, 1)
     title = "Resonance of the surface"
-    figure.suptitle(title)
+    look.title(figure, title)
     return title, f"{CAPTION} {BARS[0].upper()}{BARS[1:]}. {_left_out(found, frequency)}".strip(), figure
 
 

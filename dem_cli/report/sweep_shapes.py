@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dem_cli.errors import ScenarioError
+from dem_cli.report import look
 from dem_cli.report.look import COLORS, new_figure
 from dem_cli.report.sweep import Sweep, SweepCase
 from dem_cli.report.sweep_axes import SCENARIO, Axis
@@ -59,7 +60,7 @@ def draw_shapes(found: Sweep) -> tuple[str, str, Figure]:
     figure.legend(handles=_legend(axis, shaken), loc="outside lower center", ncols=min(4, count + 2 * shaken))
     what = "Scenarios" if axis.keys == (SCENARIO,) else "Shapes" if axis.keys[0].startswith(SHAPES) else axis.name
     title = f"{what} side by side"
-    figure.suptitle(title, parse_math=False)
+    look.title(figure, title)
     state = (
         "void ratio packed (open) and after shaking (full), and its change" if shaken else MEASURES[found.main].label
     )

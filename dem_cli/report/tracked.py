@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dem_cli.errors import ScenarioError
-from dem_cli.report.look import COLORS, SEQUENTIAL, axis_label, axis_name, display_unit, heading, largest, new_figure
+from dem_cli.report.look import (
+    COLORS,
+    SEQUENTIAL,
+    axis_label,
+    axis_name,
+    display_unit,
+    heading,
+    largest,
+    mark_size,
+    narrow,
+    new_figure,
+)
 from dem_cli.results import Results
 from dem_cli.state import Floats, Ints
 
@@ -118,7 +129,7 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
     half_x, half_y = max(half_x, 0.4 * half_y), max(half_y, 0.4 * half_x)
     side = 2.1
     shape = (min(side, side * half_x / half_y), min(side, side * half_y / half_x))
-    figure = new_figure((shape[0] + 0.55) * columns + 1.5, (shape[1] + 0.4) * rows + 1.2)
+    figure = new_figure((shape[0] + 0.55) * columns + 1.5, (shape[1] + 0.4) * rows + 1.2, rigid=True)
     axes = figure.subplots(rows, columns, squeeze=False)
     lines = None
     for k, ax in enumerate(axes.flat):
@@ -129,7 +140,7 @@ def draw_trajectories(results: Results, tracked: Paths, text: str) -> Figure:
         ax.set_aspect("equal")
         ax.set_xlim(middle_x[k] - half_x, middle_x[k] + half_x)
         ax.set_ylim(middle_y[k] - half_y, middle_y[k] + half_y)
-        ax.locator_params(nbins=4)
+        ax.locator_params(**({"nbins": 2, "min_n_ticks": 1} if narrow() else {"nbins": 4}))
         ax.set_title(f"No. {tracked.ids[k]}")
         _outer_labels(ax, k, count, columns, axis_label("x - x$_0$", unit), axis_label("y - y$_0$", unit))
     if lines is not None:
@@ -152,8 +163,8 @@ def draw_path(ax: Axes, x: Floats, y: Floats, time: Floats) -> LineCollection:
         capstyle="round",
     )
     ax.add_collection(lines)
-    ax.plot(*points[0], "o", ms=5, mfc="white", mec="black", mew=0.9)
-    ax.plot(*points[-1], "o", ms=4, color="black")
+    ax.plot(*points[0], "o", ms=mark_size(5.0), mfc="white", mec="black", mew=0.9)
+    ax.plot(*points[-1], "o", ms=mark_size(4.0), color="black")
     return lines
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import time
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -25,6 +25,9 @@ from dem_cli.results.schema import FORMAT, FORMAT_VERSION, KIND_CONTACT, KIND_WA
 from dem_cli.results.stages import Stage, read_stages
 from dem_cli.results.walls import ENDS, read_walls
 from dem_cli.state import Bonds, Contacts, Floats, Grains, Ints, Walls
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 
 @dataclass(frozen=True)
@@ -180,6 +183,23 @@ class Results:
         contacts, slips = self._contacts(k, len(grains)), read_slips(self._file, int(row["row"]))
         walls = self._walls(k, len(grains))
         return stored_increment(row, grains, contacts, slips, walls, self.boundary, coordination, stress)
+
+    @cached_property
+    def frame_table(self) -> dict[str, Floats]:
+        """The numbers that are kept with the frames: name of the layout's frames -> (n_frames,)."""
+        group = self._file["frames"]
+        return {name: np.asarray(group[name][: self.n_frames]) for name in self.layout.frames if name in group}
+
+    def to_xarray(self, group: str = "series", frames: int | slice | Sequence[int] | None = None) -> Dataset:
+        """A part of the file as an xarray dataset, in memory, with units and definitions as attributes.
+
+        group: "series", "surface", "tracks", "dissipation", "stages" (each measure before and after each stage), "frames" (their
+        numbers), "grains" (frames x grains), "contacts" (of one frame, by default the last) or "bonds". frames: those to read, by
+        default all: several, a slice, or one (from the end if negative), which leaves no axis of frames. ResultsError for what the file has not.
+        """
+        from dem_cli.results.datasets import to_xarray
+
+        return to_xarray(self, group, frames)
 
     def _frame_row(self, k: int, axis: str) -> tuple[int, dict[str, float]]:
         if self.axis != axis:
