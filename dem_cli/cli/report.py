@@ -18,8 +18,17 @@ import click
     help="Also write the tables as CSV into DIR.",
 )
 @click.option("--each", is_flag=True, help="Of a sweep: a row for each run too, not only for each point.")
-@click.option("--force", is_flag=True, help="Overwrite CSV tables that exist.")
-def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, each: bool, force: bool) -> None:
+@click.option(
+    "--html",
+    "page",
+    type=click.Path(path_type=Path),
+    metavar="PAGE",
+    help="Also write a page to look at: tables, figures, and the grains in motion.",
+)
+@click.option("--force", is_flag=True, help="Overwrite CSV tables and a page that exist.")
+def command(
+    files: tuple[Path, ...], as_json: bool, folder: Path | None, each: bool, page: Path | None, force: bool
+) -> None:
     """Print what result FILEs say.
 
     One FILE: the sample before and after each stage, sloshing, the ledger of energy, and warnings; of a
@@ -33,6 +42,9 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, each: b
 
     SWEEP, the folder of a sweep or its sweep.toml: a row a point with seeds pooled (mean and its 95 % confidence
     interval), the best point, failed members with their reasons. --csv writes cases.csv and members.csv.
+
+    --html writes PAGE, of FILEs or of a SWEEP: one file for a browser that fetches nothing, with the tables,
+    figures, scenario and provenance, and a player of the frames of each FILE.
     """
     # Imported here so that `dem --help` stays quick.
     import json
@@ -43,8 +55,12 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, each: b
     from dem_cli.report.kinds import kind_of
     from dem_cli.results import BodyResults, open_results
 
+    if page is not None:
+        _check_page(page, force)
     if of_sweep.asked_for(files, each):
         of_sweep.report(files[0], as_json, folder, each, force)
+        if page is not None:
+            _write_page(files, page)
         return
     kind = kind_of(files)
     places = export.folders(files, folder) if folder is not None else [None] * len(files)
@@ -80,3 +96,22 @@ def command(files: tuple[Path, ...], as_json: bool, folder: Path | None, each: b
         text.show(found, sys.stdout)
     else:
         text.show(shear_text.blocks(tests[0]) if len(tests) == 1 else [shear_text.comparison(tests)], sys.stdout)
+    if page is not None:
+        _write_page(files, page)
+
+
+def _check_page(page: Path, force: bool) -> None:
+    """Before anything is read: a name that will not do is told at once."""
+    from dem_cli.report.page.render import check_page
+
+    check_page(page, force)
+
+
+def _write_page(files: tuple[Path, ...], page: Path) -> None:
+    from dem_cli.cli import of_sweep
+    from dem_cli.report.page.build import file_page, sweep_page
+    from dem_cli.report.page.render import write_page
+    from dem_cli.report.sweep import read_sweep
+
+    write_page(sweep_page(read_sweep(files[0])) if of_sweep.asked_for(files) else file_page(files), page)
+    click.echo(f"wrote {page}", err=True)

@@ -97,7 +97,7 @@ NARROW = 4.5  # inch, below which what stands side by side goes below each other
 _CJK_FONTS = ("Noto Sans CJK JP", "IPAexGothic", "IPAGothic", "Hiragino Sans", "Yu Gothic", "MS Gothic")
 
 # SI unit -> units to show it in, from the largest: (SI value of the unit, name, least magnitude it is used for).
-_UNITS: dict[str, tuple[tuple[float, str, float], ...]] = {
+UNITS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1.0, "m", 0.95), (1e-2, "cm", 0.95e-2), (1e-3, "mm", 1e-4), (1e-6, "µm", 0.0)),
     "m/s": ((1.0, "m/s", 0.1), (1e-3, "mm/s", 1e-4), (1e-6, "µm/s", 0.0)),
     "Pa": ((1e9, "GPa", 1e9), (1e6, "MPa", 1e6), (1e3, "kPa", 1e3), (1.0, "Pa", 0.0)),
@@ -112,7 +112,7 @@ _UNITS: dict[str, tuple[tuple[float, str, float], ...]] = {
 
 def display_unit(unit: str, largest: float) -> tuple[float, str]:
     """Unit in which a quantity whose largest magnitude is `largest` (SI) reads well: (SI value of the unit, name)."""
-    choices = _UNITS.get(unit, ((1.0, unit, 0.0),))
+    choices = UNITS.get(unit, ((1.0, unit, 0.0),))
     known = np.isfinite(largest) and largest > 0.0
     for factor, name, least in choices:
         if largest >= least if known else factor == 1.0:
