@@ -26,11 +26,17 @@ KINDS: dict[str, tuple[str, str]] = {
     "series": ("Series", "curves of measures of the sample over the run"),
     "energy": ("Energy", "the ledger of energy over time as stacked areas: what is stored, what is lost, what was put in"),
     "surface": ("Free surface", "height of the surface over place and time, and its antisymmetric mode over time"),
+    "spectrum": (
+        "Spectrum of the surface",
+        "amplitudes of its modes over frequency, with the driving frequency and those of a liquid as deep",
+    ),
     "motion": ("Motion of the container", "acceleration, velocity and displacement over time"),
     "rose": ("Directions of contacts", "a rose of contact normals with the principal directions of the fabric"),
+    "force-distribution": ("Distribution of forces", "density of normal forces between grains over their mean, with its exponential tail"),
     "histories": ("Tracked grains", "displacement in x and y and rotation over time, a row a grain"),
     "trajectories": ("Paths of tracked grains", "their ways in the container"),
     "stress-strain": ("Stress and strain", "stress ratio and volumetric strain over the shear strain"),
+    "dilatancy": ("Dilatancy", "growth of the volumetric strain with the shear strain, and its angle"),
     "forces": ("Contact forces", "rectangles along each force, as wide as it is large, at the start and the peak"),
     "normals": ("Contact normals", "roses of contact normals in percent at the start and the peak"),
     "energy-normals": ("Elastic energy by direction", "roses of contact normals weighted by elastic energy"),
@@ -42,11 +48,13 @@ KINDS: dict[str, tuple[str, str]] = {
     "check": ("Closed form", "velocity over time beside the closed form"),
     "runout": ("Run-out", "how far bodies ran from where they started"),
 }  # fmt: skip
-OVER_TIME = ("sample", "series", "energy", "surface", "motion", "rose", "histories", "trajectories")
-OF_SHAKING = ("surface", "motion")
+OVER_TIME = (
+    "sample", "series", "energy", "surface", "spectrum", "motion", "rose", "force-distribution", "histories", "trajectories",
+)  # fmt: skip
+OF_SHAKING = ("surface", "spectrum", "motion")
 OVER_INCREMENTS = (
-    "sample", "stress-strain", "forces", "normals", "energy-normals", "coordination", "energy-tensor", "dissipation", "largest-share",
-    "ranked",
+    "sample", "stress-strain", "dilatancy", "forces", "force-distribution", "normals", "energy-normals", "coordination", "energy-tensor",
+    "dissipation", "largest-share", "ranked",
 )  # fmt: skip
 OF_BODIES = ("scene", "series", "energy", "check", "runout", "histories", "trajectories")
 FEW = ("series", "stress-strain")  # of each of several files, whose samples the players show
