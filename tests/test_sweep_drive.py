@@ -121,7 +121,7 @@ def test_preparations_of_preparations(tmp_path: Path) -> None:
 
 
 def test_what_is_done_is_not_done_again(tmp_path: Path) -> None:
-    first = Obedient(lambda task: "stopped" if "800gal" in task.target else "done")
+    first = Obedient(lambda task: "hindered" if "800gal" in task.target else "done")
     one = sweeping(tmp_path, first)
     assert one.run().done == 2
     one.store.close()
@@ -180,6 +180,21 @@ def test_and_no_third(tmp_path: Path) -> None:
     one.store.close()
 
 
+def test_a_fault_of_the_workers_is_not_one_of_the_sweep(tmp_path: Path) -> None:
+    class Faulty(Obedient):
+        def submit(self, task: Task, tell: Tell) -> Future[Answer]:
+            if "400gal-20Hz" not in task.target:
+                return super().submit(task, tell)
+            future: Future[Answer] = Future()
+            future.set_exception(ConnectionError("gone"))
+            return future
+
+    one = sweeping(tmp_path, Faulty())
+    tally = one.run()
+    assert (tally.done, tally.failed) == (3, {"400gal-20Hz": "ConnectionError: gone"})
+    one.store.close()
+
+
 def test_a_result_file_that_does_not_come_counts_as_lost(tmp_path: Path) -> None:
     class Liar(Obedient):
         def submit(self, task: Task, tell: Tell) -> Future[Answer]:
@@ -220,6 +235,15 @@ def test_workers_of_another_version_stop_the_sweep(tmp_path: Path) -> None:
     with pytest.raises(ScenarioError, match=r"workers of another program version: it strange\. Install the same one"):
         one.run()
     one.store.close()
+
+
+def test_workers_that_stop_by_themselves_end_the_sweep(tmp_path: Path) -> None:
+    """As those of a scheduler that has ended: nothing would be done, and it would look as if all was well."""
+    one = sweeping(tmp_path, Obedient(lambda task: "stopped" if "400gal-20Hz" in task.target else "done", slots=1))
+    with pytest.raises(RunError, match="the workers have stopped"):
+        one.run()
+    one.store.close()
+    assert [m.state for m in read_manifest(tmp_path / "out").members] == ["done", "waiting", "waiting", "waiting"]
 
 
 def test_an_interrupt_keeps_what_is_done(tmp_path: Path) -> None:
@@ -266,7 +290,7 @@ def test_what_another_sweep_has_finished_meanwhile_is_not_run(tmp_path: Path) ->
 def test_what_another_sweep_has_found_to_fail_is_not_tried_again(tmp_path: Path) -> None:
     """Though ours began before that one wrote it into the manifest; with --retry it is."""
     one = sweeping(tmp_path, workers := Obedient(slots=1))
-    other = sweeping(tmp_path, Obedient(lambda task: "failed" if "400gal-20Hz" in task.target else "stopped"))
+    other = sweeping(tmp_path, Obedient(lambda task: "failed" if "400gal-20Hz" in task.target else "hindered"))
     write_preparation(one.store, next(iter(one.plan.shared)))
     other.run()
     other.store.close()

@@ -108,6 +108,13 @@ def test_what_identifies_the_first_stages(tmp_path: Path) -> None:
     assert [one == other for one, other in zip(of({}), first, strict=True)] == [True, True, False]
 
 
+def test_another_program_prepares_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = parse_scenario(sweep_text())
+    ours = list(prefixes(scenario))
+    monkeypatch.setattr("dem_cli.sweep.plan.program_identity", lambda: "dem-cli 9")
+    assert set(prefixes(scenario)).isdisjoint(ours)
+
+
 def test_the_impulse_engine_shares_where_the_time_step_is_given() -> None:
     """Else it follows from the fastest motion of all stages, so that the packing itself is another one."""
     for step, alike in (("2 ms", True), ("auto", False)):

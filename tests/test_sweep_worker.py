@@ -15,6 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from sweep_text import sweep_text
 from test_run_prepared import assert_same
@@ -130,6 +131,15 @@ def test_a_task_of_a_sweep_that_has_ended_is_not_begun(monkeypatch: pytest.Monke
     assert out.getvalue() == ""
 
 
+def test_a_process_keeps_to_one_core() -> None:
+    process = WorkerProcess()
+    try:
+        settings = psutil.Process(process._running().pid).environ()
+    finally:
+        process.close()
+    assert {settings[f"{name}_NUM_THREADS"] for name in ("NUMBA", "OMP", "OPENBLAS", "MKL")} == {"1"}
+
+
 def test_a_process_without_work_ends_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker, "IDLE", 0.05)
     ours, theirs = os.pipe()
@@ -178,10 +188,11 @@ def test_no_member_outlives_its_sweep(tmp_path: Path) -> None:
     ours.stdin.write(task.to_json() + "\n")
     ours.stdin.flush()
     assert "share" in ours.stdout.readline()
-    ours.stdin.close()
-    ours.stdout.close()
-    began = time.monotonic()
-    assert ours.wait(20.0) in (0, -signal.SIGTERM)
-    assert time.monotonic() - began < 20.0
+    ours.stdin.close()  # alone: a word to nobody would end it, too, but later
+    try:
+        assert ours.wait(20.0) in (0, -signal.SIGTERM)
+    finally:
+        ours.kill()
+        ours.stdout.close()
     with open_results(tmp_path / "out.partial.h5") as results:
         assert not results.complete

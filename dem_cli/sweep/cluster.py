@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import logging
 import os
 import queue
 import secrets
@@ -70,6 +71,7 @@ class ClusterWorkers:
         self._ships = False
         self._counted, self._threads = -COUNT_EVERY, 0
         self._tells: dict[str, Tell] = {}
+        self._remotes: set[Any] = set()
         self._lock = threading.Lock()
         self._client = _connect(address)
         try:
@@ -89,7 +91,9 @@ class ClusterWorkers:
         """Threads of all workers, which may come and go; as they were some seconds ago."""
         now = time.monotonic()
         if now - self._counted > COUNT_EVERY:
-            self._counted, self._threads = now, int(sum(self._client.nthreads().values()))
+            self._counted = now
+            with contextlib.suppress(Exception):  # the scheduler is gone: its tasks will tell
+                self._threads = int(sum(self._client.nthreads().values()))
         return self._threads
 
     def submit(self, task: Task, tell: Tell) -> Future[Answer]:
@@ -109,10 +113,12 @@ class ClusterWorkers:
             parcel = _packed(parcel)
         # A key of its own each time: Dask would give the old answer for an old key.
         remote = self._client.submit(do_parcel, parcel, key=f"{task.key}-{secrets.token_hex(4)}", pure=False)
+        self._remotes.add(remote)
         remote.add_done_callback(functools.partial(self._came, task, done))
 
     def _came(self, task: Task, done: Future[Answer], remote: Any) -> None:
         """Called in a thread of Dask's."""
+        self._remotes.discard(remote)
         try:
             if remote.cancelled():
                 answer = Answer("stopped")
@@ -157,6 +163,8 @@ class ClusterWorkers:
             from distributed import Event
 
             Event(self._name, client=self._client).set()
+            if not self._client.nthreads():  # nobody is there to answer
+                self._client.cancel(list(self._remotes))
 
     def close(self) -> None:
         self._client.close()
@@ -169,6 +177,9 @@ def _connect(address: str) -> Any:
         from distributed.comm.registry import get_backend
     except ImportError:
         raise ClusterError("--scheduler needs Dask: pip install 'dem-cli[cluster]', here and on the workers") from None
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # what it says of a scheduler that is gone, we say
     try:  # a client with an address of no kind would not let go for half a minute
         kind, place = parse_address(address)
         get_backend(kind)

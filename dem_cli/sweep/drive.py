@@ -147,7 +147,7 @@ class Sweeping:
     def run(self, check: Callable[[], None] = lambda: None) -> Tally:
         """Run what is left; returns what came of it. check: called twice a second, may raise KeyboardInterrupt.
 
-        RunError if the disk is full, ScenarioError if a worker is of another program version; what is done is done.
+        RunError if the disk is full or the workers are gone, ScenarioError if a worker is of another program version; what is done is done.
         """
         self._collect()
         self.watcher.show(self.tally)
@@ -237,8 +237,11 @@ class Sweeping:
         if answer.end in ("failed", "refused"):
             self.store.condemn(job.key, answer.reason)
         self.store.release(job.key)
-        if answer.end == "stopped":
-            return
+        if answer.end == "stopped":  # not by us: then nothing is taken any more
+            raise RunError(
+                f"{self.store.folder}: the workers have stopped, e.g. as their scheduler has ended. "
+                "Members that are done are kept; the same command goes on with the others"
+            )
         if answer.end == "strange":
             raise ScenarioError(f"workers of another program version: {answer.reason}. Install the same one everywhere")
         if answer.end == "full":
