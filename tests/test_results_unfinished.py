@@ -162,6 +162,17 @@ def test_the_old_file_stays_until_the_new_one_is_complete(tmp_path: Path) -> Non
         assert results.stop_reason == "second"
 
 
+def test_a_run_that_was_taken_for_dead_does_not_put_its_name_on_anothers_file(tmp_path: Path) -> None:
+    """Two runs to one file, the second with --force: the partial file is its, and so is the name."""
+    path = tmp_path / "out.h5"
+    with open_writer(path) as first, open_writer(path, force=True) as second:
+        with pytest.raises(RunError, match="another run has taken its place"):
+            first.finish("first")
+        second.finish("second")
+    with open_results(path) as results:
+        assert results.stop_reason == "second"
+
+
 def test_a_folder_that_is_missing_or_the_target_itself(tmp_path: Path) -> None:
     with pytest.raises(ResultsError, match=r"the folder .*nowhere does not exist"):
         open_writer(tmp_path / "nowhere" / "out.h5")

@@ -13,6 +13,7 @@ import h5py
 import pytest
 from sweep_text import GAL_HZ, sweep_file
 
+from dem_cli.cli.sweep_progress import told
 from dem_cli.errors import RunError, ScenarioError
 from dem_cli.results import partial_path
 from dem_cli.results.manifest import read_manifest
@@ -363,6 +364,15 @@ def test_what_an_interrupted_run_has_left_is_cleared(tmp_path: Path) -> None:
     one.run()
     assert not left.exists()
     one.store.close()
+
+
+def test_a_line_tells_where_the_sweep_is() -> None:
+    tally = Tally(total=9, skipped=2, done=1, seconds=[90.0])
+    assert told(tally) == "3 of 9 done, about 9 min 0 s left"
+    tally.fail("x", "y")
+    assert told(tally) == "3 of 9 done, 1 failed, about 7 min 30 s left"
+    tally.at_once = 0
+    assert told(tally) == "3 of 9 done, waiting for workers, 1 failed, about 7 min 30 s left"
 
 
 def test_time_left_is_reckoned_from_what_members_took() -> None:

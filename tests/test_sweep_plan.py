@@ -167,6 +167,11 @@ def test_a_key_of_the_command_line_is_named_as_it_was_given(tmp_path: Path) -> N
     assert str(error.value) == '--vary contact.frictio = 0.1: unknown key. Did you mean "contact.friction"?'
 
 
+def test_a_key_is_set_or_varied(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"^--set seed=5: the sweep varies seed\. Leave one of them out$"):
+        make_plan(sweep_file(tmp_path, {"seeds": 2}), ["seed=5"])
+
+
 def test_several_scenarios_with_the_same_grid(tmp_path: Path) -> None:
     sweep_file(tmp_path, {"seeds": 5}, name="one.toml")  # its own sweep is left aside
     sweep_file(tmp_path, None, {"contact.friction": 0.5}, name="two.toml")

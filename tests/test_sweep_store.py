@@ -187,6 +187,26 @@ def test_a_manifest_that_cannot_be_written_leaves_the_old_one(tmp_path: Path, mo
     store.close()
 
 
+def test_the_manifest_of_a_newer_program_is_left_alone(tmp_path: Path) -> None:
+    store = Store(manifest_of(tmp_path))
+    text = 'format = "dem-cli sweep"\nformat_version = 99\n'
+    (store.folder / "sweep.toml").write_text(text)
+    with pytest.raises(ResultsError, match="written by a newer dem-cli"):
+        store.begin()
+    assert (store.folder / "sweep.toml").read_text() == text
+    store.close()
+
+
+def test_preparations_that_nothing_goes_on_from_are_removed(tmp_path: Path) -> None:
+    store = Store(manifest_of(tmp_path))
+    for key in ("ours", "theirs"):
+        for path in store.preparation(key):
+            path.write_bytes(b"")
+    store.discard_preparations({"ours": 1, "another": 2})
+    assert sorted(path.name for path in store.preparation("ours")[0].parent.iterdir()) == ["ours.h5", "ours.state"]
+    store.close()
+
+
 def test_failures_count_for_the_program_that_found_them() -> None:
     failed = Member("m", "m.h5", "1", {}, "failed", "blew up", program=program_identity())
     assert failed_before(failed)

@@ -86,6 +86,7 @@ def command(
     store = Store(plan.manifest(folder))
     try:
         store.begin()
+        store.discard_preparations(plan.shared)
         tally = _run(settings, plan, store, jobs, scheduler, retry)
     finally:
         store.close()
@@ -118,6 +119,7 @@ def _varied(texts: Sequence[str]) -> Points:
 def _run(settings: Settings, plan: Plan, store: Store, jobs: int, scheduler: str | None, retry: bool) -> Tally:
     from dem_cli.cli.sweep_progress import SweepProgress
     from dem_cli.interrupts import marked_interrupts
+    from dem_cli.jit import is_cold
     from dem_cli.sweep.drive import Sweeping
     from dem_cli.sweep.local import LocalWorkers, Workers
 
@@ -126,12 +128,16 @@ def _run(settings: Settings, plan: Plan, store: Store, jobs: int, scheduler: str
         from dem_cli.sweep.cluster import ClusterWorkers
 
         workers = ClusterWorkers(scheduler, store.token)
-        where = f"{scheduler}, which has room for {workers.at_once} at a time"
+        room = workers.at_once
+        where = f"{scheduler}, which has {f'room for {room} at a time' if room else 'no workers yet'}"
     else:
         workers = LocalWorkers(jobs)
         where = f"{jobs} process{'es' if jobs > 1 else ''}"
     with SweepProgress(settings.verbosity) as progress, marked_interrupts() as check:
-        progress.say(f"{plan.title}: {len(store.manifest.members)} members, to {store.folder}, on {where}")
+        count = len(store.manifest.members)
+        progress.say(f"{plan.title}: {count} member{'s' if count > 1 else ''}, to {store.folder}, on {where}")
+        if not scheduler and is_cold():
+            progress.say("compiling the kernels, once after installation: up to a minute, in which no member moves on")
         for line in _remarks(plan, store):
             progress.say(line)
         try:

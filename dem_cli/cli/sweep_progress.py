@@ -80,7 +80,8 @@ def told(tally: Tally) -> str:
     preparing = len(tally.running) - running
     parts = [f"{tally.done + tally.skipped} of {tally.total} done"]
     parts += [f"{preparing} being prepared"] if preparing else []
-    parts += [f"{running} running"] if running else []
+    parts += [f"{running} running"] if running and tally.at_once else []
+    parts += ["waiting for workers"] if not tally.at_once else []
     parts += [f"{len(tally.failed)} failed"] if tally.failed else []
     if tally.open and tally.seconds:
         parts.append(f"about {clock(tally.seconds_left)} left")

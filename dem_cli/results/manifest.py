@@ -20,6 +20,12 @@ from dem_cli.errors import ResultsError
 NAME = "sweep.toml"
 FORMAT, FORMAT_VERSION = "dem-cli sweep", 1
 HEAD = "# Written by dem sweep, read by dem report. Result files lie beside it; it can be made anew from them.\n"
+
+
+class NewerManifestError(ResultsError):
+    """A manifest of a version of the program that this one does not know: not to be written over."""
+
+
 State = Literal["waiting", "done", "failed"]
 Kind = Literal["grid", "zip", "scenario"]
 
@@ -95,7 +101,7 @@ def read_manifest(path: Path | str) -> Manifest:
     if raw.get("format") != FORMAT or not isinstance(raw.get("format_version"), int):
         raise ResultsError(f"{file}: is no manifest of a sweep")
     if raw["format_version"] > FORMAT_VERSION:
-        raise ResultsError(f"{file}: written by a newer dem-cli (format {raw['format_version']}); update dem-cli")
+        raise NewerManifestError(f"{file}: written by a newer dem-cli (format {raw['format_version']}); update dem-cli")
     try:
         return Manifest(
             title=str(raw["title"]),

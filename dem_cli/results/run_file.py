@@ -223,9 +223,12 @@ class RunFile:
             self._file.attrs.modify("complete", int(complete))
             self._file.flush()
             announce_length(self._file, 0)
+            ours = os.fstat(self._file.id.get_vfd_handle())
             self._file.close()
             self._open = False
             if complete:
+                if not os.path.samestat(ours, os.stat(self._partial)):  # begun anew by somebody who took us for dead
+                    raise OSError(errno.ESTALE, "another run has taken its place")
                 os.replace(self._partial, self.path)
                 self._finished = True
 

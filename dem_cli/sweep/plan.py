@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections import Counter
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -110,7 +110,7 @@ def text_of(path: Path) -> str:
     return read_text(path)
 
 
-def read_plan(path: Path, varied: Points) -> tuple[Sweep, str]:
+def read_plan(path: Path, overrides: Iterable[str], varied: Points) -> tuple[Sweep, str]:
     """The sweep of a scenario file, with keys varied from the command line, and the title. ScenarioError in one line per mistake."""
     text_of.cache_clear()
     origin = str(path)
@@ -129,6 +129,9 @@ def read_plan(path: Path, varied: Points) -> tuple[Sweep, str]:
             raise ScenarioError(
                 f'{origin}: [sweep] scenario: is no key of a scenario. Name other files in a list of their own: scenarios = ["discs.toml"]'
             )
+    for override in overrides:
+        if (key := override.partition("=")[0].strip()) in {name for _, points in sweep.axes for name in points}:
+            raise ScenarioError(f"--set {override}: the sweep varies {key}. Leave one of them out")
     if not sweep.axes:
         raise ScenarioError(
             f'{origin}: [sweep]: varies nothing. Add a grid to the table, or give --vary "stage.shake.amplitude=400 gal,800 gal"'
@@ -142,7 +145,7 @@ def make_plan(path: Path, overrides: Iterable[str] = (), varied: Points | None =
     overrides: as of --set, for all members. varied: as of --vary. ScenarioError where an axis names no key, where no member can be
     run, and where there are more than `most` members.
     """
-    sweep, title = read_plan(path, varied or {})
+    sweep, title = read_plan(path, overrides, varied or {})
     if most is not None and sweep.count > most:
         raise ScenarioError(
             f"{path}: the sweep has {sweep.count:,} members, more than {most:,}. Give --yes if that is meant"
@@ -248,24 +251,26 @@ def _shared(members: list[Planned]) -> tuple[dict[str, Shared], dict[str, str]]:
 
     Stages are worth a preparation of their own where several members begin with them and these do not all go on alike.
     """
-    count = Counter(key for member in members for key in member.prefixes)
+    having: dict[str, list[Planned]] = defaultdict(list)
+    for member in members:
+        for key in member.prefixes:
+            having[key].append(member)
     shared: dict[str, Shared] = {}
     start: dict[str, str] = {}
     for member in members:
         parent: str | None = None
         keys = member.prefixes
         for stages, key in enumerate(keys, 1):
-            longer = count[keys[stages]] if stages < len(keys) else 0
-            if count[key] >= 2 and count[key] > longer:
+            alike, longer = having[key], len(having[keys[stages]]) if stages < len(keys) else 0
+            if len(alike) >= 2 and len(alike) > longer:
                 if key not in shared:
-                    alike = [one for one in members if key in one.prefixes]
                     common = {
                         name: value
                         for name, value in member.settings.items()
                         if all(one.settings[name] == value for one in alike)
                     }
                     names = tuple(stage.name for stage in member.load().stages[:stages])
-                    shared[key] = Shared(key, stages, member, parent, count[key], common, names)
+                    shared[key] = Shared(key, stages, member, parent, len(alike), common, names)
                 parent = key
         if parent:
             start[member.hash] = parent

@@ -16,7 +16,7 @@ import os
 import pickle
 import secrets
 import socket
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,7 +24,7 @@ import h5py
 
 from dem_cli.errors import ResultsError
 from dem_cli.results.files import partial_path
-from dem_cli.results.manifest import NAME, Manifest, Member, read_manifest, write_manifest
+from dem_cli.results.manifest import NAME, Manifest, Member, NewerManifestError, read_manifest, write_manifest
 from dem_cli.results.provenance import program_identity
 from dem_cli.sweep.plan import Planned
 
@@ -107,6 +107,12 @@ class Store:
                 return False
             self._sound[key] = marks
         return True
+
+    def discard_preparations(self, keys: Collection[str]) -> None:
+        """Remove preparations but those of `keys`: of a scenario or a program that has changed since, nothing goes on from them."""
+        for path in (self.folder / INNER / "preparations").iterdir():
+            if path.name.partition(".")[0] not in keys:
+                path.unlink(missing_ok=True)
 
     def discard_partial(self, member: Member) -> None:
         """What an interrupted run of a member has left; it is redone from the start of its own stages."""
@@ -221,6 +227,8 @@ class Store:
     def _written(self) -> tuple[Member, ...]:
         try:
             return read_manifest(self.folder).members
+        except NewerManifestError:
+            raise
         except ResultsError:
             return ()
 
@@ -228,8 +236,9 @@ class Store:
         try:
             write_manifest(self.manifest)
         except OSError as error:
+            first = "make room" if error.errno in (errno.ENOSPC, errno.EDQUOT) else "mend that"
             raise ResultsError(
-                f"{self.folder / NAME}: cannot be written ({error.strerror}). No result file is lost; make room and run the same command again"
+                f"{self.folder / NAME}: cannot be written ({error.strerror}). No result file is lost; {first} and run the same command again"
             ) from error
 
 
