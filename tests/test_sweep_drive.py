@@ -219,6 +219,18 @@ def test_members_of_a_preparation_that_fails_fail_with_it(tmp_path: Path) -> Non
     one.store.close()
 
 
+@pytest.mark.parametrize(("end", "again"), [("failed", 0), ("hindered", 3)])
+def test_they_are_tried_again_where_their_preparation_would_be(tmp_path: Path, end: End, again: int) -> None:
+    """A preparation that blows up does so again; one that was hindered by the machine may go well."""
+    one = sweeping(tmp_path, Obedient(lambda task: end if task.stages else "done"), {"seeds": 1, "zip": GAL_HZ})
+    one.run()
+    one.store.close()
+    second = sweeping(tmp_path, workers := Obedient(), {"seeds": 1, "zip": GAL_HZ})
+    second.run()
+    second.store.close()
+    assert len(workers.done) == again
+
+
 def test_a_full_disk_stops_the_sweep_and_loses_nothing(tmp_path: Path) -> None:
     workers = Obedient(lambda task: "full" if "800gal-10Hz" in task.target else "done", slots=1)
     one = sweeping(tmp_path, workers)

@@ -35,7 +35,6 @@ class Job:
     tries: int = 0
     share: float = 0.0
     words: str = ""
-    began: float = math.nan
 
     def tell(self, share: float, words: str) -> None:
         self.share, self.words = share, words
@@ -92,7 +91,6 @@ class Sweeping:
         self._flights: dict[Future[Answer], Job] = {}
         self._news: dict[str, Member] = {}
         self._recorded = 0.0
-        self._full = ""
         self._records = {one.hash: one for one in store.manifest.members if one.hash}
         self.tally = Tally(len(store.manifest.members), at_once=workers.at_once)
 
@@ -188,7 +186,6 @@ class Sweeping:
             del self._jobs[job.key]
             if job.member:
                 self.store.discard_partial(self._records[job.key])
-            job.began = time.monotonic()
             job.tries += 1
             self._flights[self.workers.submit(job.task, job.tell)] = job
         return bool(self._flights or self._jobs)
@@ -251,7 +248,7 @@ class Sweeping:
         if job.member:
             self._end_member(job.member, answer)
         elif answer.end != "done":
-            self._give_up(job.key, f"its preparation failed: {answer.reason}")
+            self._give_up(job.key, replace(answer, reason=f"its preparation failed: {answer.reason}"))
         else:
             self.watcher.say(f"{job.name}: done in {answer.seconds:.0f} s")
 
@@ -277,14 +274,14 @@ class Sweeping:
             program="" if answer.end in ("lost", "hindered") else program_identity(),  # those may go well the next time
         )
 
-    def _give_up(self, key: str, reason: str) -> None:
-        """All that start from a preparation that failed."""
+    def _give_up(self, key: str, answer: Answer) -> None:
+        """All that start from a preparation that came to no good, each with its answer."""
         for job in [one for one in self._jobs.values() if one.needs == key]:
             del self._jobs[job.key]
             if job.member:
-                self._end_member(job.member, Answer("failed", reason))
+                self._end_member(job.member, replace(answer, seconds=0.0))
             else:
-                self._give_up(job.key, reason)
+                self._give_up(job.key, answer)
 
     def _record(self, *, now: bool = False) -> None:
         """Write the news into the manifest, some seconds late at most."""
