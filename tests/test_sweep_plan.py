@@ -10,6 +10,7 @@ from impulse_text import pour
 from sweep_text import GAL_HZ, sweep_file, sweep_text
 
 from dem_cli.errors import OverrideError, ScenarioError
+from dem_cli.results.manifest import brief_names
 from dem_cli.scenario import load_scenario, parse_scenario
 from dem_cli.sweep.plan import Plan, make_plan, prefixes, slug
 
@@ -43,14 +44,31 @@ def test_members_are_the_scenarios_that_dem_run_would_run(tmp_path: Path) -> Non
     ],
 )
 def test_names_of_files_tell_the_settings(settings: dict[str, Any], name: str) -> None:
-    assert slug(settings) == name
+    assert slug(settings, {"a/discs.toml": "discs"}) == name
+
+
+@pytest.mark.parametrize(
+    ("files", "names"),
+    [
+        (["thesis-discs-10hz.toml", "thesis-pairs-10hz.toml"], ["discs", "pairs"]),
+        (["a/thesis-discs.toml", "b/thesis-bonded-pairs.toml"], ["discs", "bonded-pairs"]),
+        (["discs.toml"], ["discs"]),
+        (["thesis-discs.toml"], ["thesis-discs"]),
+        (["a.toml", "a-b.toml"], ["a", "a-b"]),
+        (["x-a-x.toml", "x-x.toml"], ["a-x", "x"]),
+        (["a/box.toml", "b/box.toml"], ["box", "box"]),
+        ([], []),
+    ],
+)
+def test_scenario_files_are_called_by_what_tells_them_apart(files: list[str], names: list[str]) -> None:
+    assert list(brief_names(files).values()) == names
 
 
 def test_one_packing_serves_all_ways_of_shaking(tmp_path: Path) -> None:
     plan = plan_of(tmp_path, {"grid": GAL_HZ, "seeds": 2})
-    assert [(one.stages, one.members, one.parent, one.settings) for one in plan.shared.values()] == [
-        (1, 4, None, {"seed": 1}),
-        (1, 4, None, {"seed": 2}),
+    assert [(one.stages, one.members, one.parent, one.common) for one in plan.shared.values()] == [
+        (1, 4, None, "seed1"),
+        (1, 4, None, "seed2"),
     ]
     assert [one.label for one in plan.shared.values()] == [
         "packing for 4 members (seed1)", "packing for 4 members (seed2)",

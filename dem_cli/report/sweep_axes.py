@@ -9,11 +9,10 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
 from typing import Any
 
 from dem_cli import units
-from dem_cli.results.manifest import Manifest, SweepAxis
+from dem_cli.results.manifest import Manifest, SweepAxis, brief_names
 
 SEED, SCENARIO = "seed", "scenario"
 SHAKING = ("amplitude", "frequency")
@@ -101,7 +100,8 @@ def _axis(keys: tuple[str, ...], points: tuple[tuple[Any, ...], ...], names: Seq
     unit, values = _numbers(column)
     texts = tuple(f"{value:.6g}" for value in values) if values is not None else tuple(_text(value) for value in column)
     if keys == (SCENARIO,):
-        texts = tuple(PurePath(str(value)).stem for value in column)
+        brief = brief_names([str(value) for value in column])
+        texts = tuple(brief[str(value)] for value in column)
     if len(set(texts)) < len(texts):
         texts = tuple(str(value) for value in values or column)
     return Axis(keys, points, shown[chief], unit, texts, values, every if len(keys) > 1 else texts)

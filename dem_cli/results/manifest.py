@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -77,6 +77,21 @@ class Manifest:
     def path(self, member: Member) -> Path:
         """Where a member's result file lies."""
         return self.folder / member.file
+
+
+def brief_names(files: Sequence[str]) -> dict[str, str]:
+    """Scenario files by what tells them apart: of thesis-discs-10hz.toml and thesis-pairs-10hz.toml discs and pairs."""
+    stems = {file: Path(file).stem for file in files}
+    words = [stem.split("-") for stem in stems.values()]
+    first = last = 0
+    if len(words) > 1:
+        shortest = min(map(len, words))
+        while first < shortest - 1 and len({one[first] for one in words}) == 1:
+            first += 1
+        while last < shortest - 1 - first and len({one[-1 - last] for one in words}) == 1:
+            last += 1
+    brief = {file: "-".join(stem.split("-")[first : len(stem.split("-")) - last]) for file, stem in stems.items()}
+    return brief if len(set(brief.values())) == len(set(stems.values())) else stems
 
 
 def is_sweep(path: Path | str) -> bool:

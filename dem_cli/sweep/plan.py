@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from dem_cli.errors import OverrideError, ScenarioError
-from dem_cli.results.manifest import Manifest, Member, SweepAxis
+from dem_cli.results.manifest import Manifest, Member, SweepAxis, brief_names
 from dem_cli.results.provenance import program_identity
 from dem_cli.scenario import EngineScenario, ImpulseScenario, parse_scenario
 from dem_cli.scenario.base import files_named
@@ -55,7 +55,7 @@ class Planned:
 class Shared:
     """The first `stages` of the member `of`, which others begin with as well. parent: key of the one that this goes on from.
 
-    settings: those that all `members` of them have in common; names: of the stages.
+    common: the settings that all `members` of them share, as in names of files; names: of the stages.
     """
 
     key: str
@@ -63,14 +63,13 @@ class Shared:
     of: Planned
     parent: str | None
     members: int
-    settings: Mapping[str, Any]
+    common: str
     names: tuple[str, ...]
 
     @property
     def label(self) -> str:
         """What it is, in words: packing for 9 members of discs."""
-        common = slug(self.settings) if self.settings else ""
-        return f"{', '.join(self.names)} for {self.members} members{f' ({common})' if common else ''}"
+        return f"{', '.join(self.names)} for {self.members} members{f' ({self.common})' if self.common else ''}"
 
 
 @dataclass(frozen=True)
@@ -154,11 +153,12 @@ def make_plan(path: Path, overrides: Iterable[str] = (), varied: Points | None =
         SweepAxis(tuple(points), tuple(zip(*points.values(), strict=True)), kind)  # type: ignore[arg-type]
         for kind, points in sweep.axes
     )
+    brief = brief_names(sweep.scenarios)
     valid: dict[str, Planned] = {}
     invalid: list[Planned] = []
     twins = 0
     for settings in sweep.members():
-        member = _planned(path, settings, tuple(overrides), varied or {})
+        member = _planned(path, settings, tuple(overrides), varied or {}, brief)
         if member.error:
             invalid.append(member)
         elif member.hash in valid:
@@ -167,15 +167,20 @@ def make_plan(path: Path, overrides: Iterable[str] = (), varied: Points | None =
             valid[member.hash] = member
     if not valid:
         raise ScenarioError("\n".join(dict.fromkeys(error for one in invalid for error in one.error.splitlines())))
-    shared, start = _shared(list(valid.values()))
+    shared, start = _shared(list(valid.values()), brief)
     return Plan(title, path, axes, tuple(valid.values()), shared, start, twins, tuple(invalid))
 
 
-def _planned(path: Path, settings: Mapping[str, Any], overrides: tuple[str, ...], varied: Points) -> Planned:
+def _planned(
+    path: Path, settings: Mapping[str, Any], overrides: tuple[str, ...], varied: Points, brief: Mapping[str, str]
+) -> Planned:
     """A member by its settings. ScenarioError if these name no key of the scenario, or no file."""
     base = path.parent / settings["scenario"] if "scenario" in settings else path
     own = overrides_of(settings)
-    name, words = slug(settings), ", ".join(_said(key, value) for key, value in settings.items() if key != "scenario")
+    name, words = (
+        slug(settings, brief),
+        ", ".join(_said(key, value) for key, value in settings.items() if key != "scenario"),
+    )
     try:
         scenario = parse_scenario(text_of(base), str(base), base.parent, (*overrides, *own))
     except OverrideError as error:
@@ -202,12 +207,12 @@ def _planned(path: Path, settings: Mapping[str, Any], overrides: tuple[str, ...]
     return Planned(name, settings, base, (*overrides, *own, *title), scenario.hash, tuple(prefixes(scenario)))
 
 
-def slug(settings: Mapping[str, Any]) -> str:
-    """Settings as the name of a file: discs-400gal-10Hz-seed1."""
+def slug(settings: Mapping[str, Any], brief: Mapping[str, str]) -> str:
+    """Settings as the name of a file: discs-400gal-10Hz-seed1. brief: names of scenario files."""
     parts = []
     for key, value in settings.items():
         if key == "scenario":
-            parts.append(Path(str(value)).stem)
+            parts.append(brief[str(value)])
         elif isinstance(value, str) and re.match(r"[+-]?[\d.]", value):
             parts.append(value)
         else:
@@ -246,7 +251,7 @@ def _step_facts(scenario: EngineScenario) -> list[Any]:
     return [stage.model_dump(mode="json") for stage in scenario.stages]
 
 
-def _shared(members: list[Planned]) -> tuple[dict[str, Shared], dict[str, str]]:
+def _shared(members: list[Planned], brief: Mapping[str, str]) -> tuple[dict[str, Shared], dict[str, str]]:
     """Preparations, each before those that go on from it, and what each member starts from.
 
     Stages are worth a preparation of their own where several members begin with them and these do not all go on alike.
@@ -270,7 +275,9 @@ def _shared(members: list[Planned]) -> tuple[dict[str, Shared], dict[str, str]]:
                         if all(one.settings[name] == value for one in alike)
                     }
                     names = tuple(stage.name for stage in member.load().stages[:stages])
-                    shared[key] = Shared(key, stages, member, parent, len(alike), common, names)
+                    shared[key] = Shared(
+                        key, stages, member, parent, len(alike), slug(common, brief) if common else "", names
+                    )
                 parent = key
         if parent:
             start[member.hash] = parent
