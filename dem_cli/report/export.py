@@ -68,7 +68,9 @@ def write_tables(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool)
     paths = {name: folder / name for name in tables}
     there = [str(path) for path in paths.values() if path.exists()]
     if there and not force:
-        raise ResultsError(f"{', '.join(there)} exists; choose another folder or add --force")
+        raise ResultsError(
+            f"{', '.join(there)} {'exist' if there[1:] else 'exists'}; choose another folder or add --force"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, rows in tables.items():

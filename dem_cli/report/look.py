@@ -210,12 +210,12 @@ def new_figure(width: float, height: float, *, rigid: bool = False, page: bool =
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def check_target(path: Path, force: bool) -> None:
+def check_target(path: Path, force: bool, also: Sequence[str] = ()) -> None:
     """Raise ScenarioError if `path` has an unknown ending, ResultsError if it would be overwritten without
-    `force`.
+    `force`. also: endings that other pictures of the kind may have.
     """
     if path.suffix.lower() not in ENDINGS:
-        raise ScenarioError(f"{path}: a picture's name must end in {', '.join(ENDINGS)}")
+        raise ScenarioError(f"{path}: a picture's name must end in {', '.join((*ENDINGS, *also))}")
     if path.exists() and not force:
         raise ResultsError(f"{path} exists; choose another name with -o or add --force")
 
