@@ -24,6 +24,8 @@ def check_page(path: Path, force: bool) -> None:
         raise ScenarioError(f"{path}: a page's name must end in {' or '.join(ENDINGS)}")
     if not path.parent.is_dir():
         raise ResultsError(f"{path}: there is no folder {path.parent}")
+    if path.is_dir():
+        raise ResultsError(f"{path}: is a folder; choose another name")
     if path.exists() and not force:
         raise ResultsError(f"{path} exists; choose another name or add --force")
 
