@@ -286,7 +286,7 @@ def _check_animation(
 ) -> None:
     """Raise DemError for what can be no animation, or one that would be overwritten. moment: one frame is asked for."""
     from dem_cli.errors import ScenarioError
-    from dem_cli.report.movies import check_target
+    from dem_cli.report.movies import GIF_FASTEST, check_target
 
     if what not in ("sample", "scene"):
         raise ScenarioError(
@@ -298,6 +298,8 @@ def _check_animation(
         )
     if fps and speed:
         raise ScenarioError("--fps and --speed exclude each other")
+    if fps and fps > GIF_FASTEST and target.suffix.lower() == ".gif":
+        raise ScenarioError(f"--fps {fps:g}: a GIF shows {GIF_FASTEST:g} frames a second at most; write .mp4")
     if look != "screen":
         raise ScenarioError(f"--style {look} is for pictures on a page, not for an animation")
     check_target(target, force)
