@@ -14,6 +14,7 @@ import numpy as np
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.shear import STATE, ShearSummary
 from dem_cli.report.summary import MEASURES, Summary
+from dem_cli.report.whole import whole
 from dem_cli.results import Results
 from dem_cli.results.schema import INCREMENTS, SERIES
 
@@ -74,7 +75,7 @@ def write_tables(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, rows in tables.items():
-            with paths[name].open("w", newline="", encoding="utf-8") as stream:
+            with whole(paths[name]) as work, work.open("w", newline="", encoding="utf-8") as stream:
                 csv.writer(stream, lineterminator="\n").writerows(rows)
     except OSError as error:
         raise ResultsError(f"{folder}: cannot be written: {error.strerror}") from None

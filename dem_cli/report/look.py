@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.report.whole import whole
 from dem_cli.state import Floats
 
 if TYPE_CHECKING:
@@ -234,7 +235,8 @@ def save(figure: Figure, path: Path, dpi: float) -> None:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         try:
-            figure.savefig(path, dpi=dpi, metadata=metadata)
+            with whole(path) as work:
+                figure.savefig(work, dpi=dpi, metadata=metadata, format=ending[1:])
         except OSError as error:
             raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
 
