@@ -88,6 +88,7 @@ def test_incomplete_run_is_told(tmp_path: Path) -> None:
         ["--grains", "7", "--what", "histories"],
         ["--range", "1", "--what", "sample"],
         ["--range", "2,1"],
+        ["--range", "0,inf"],
         ["--range", "0,1", "--what", "series"],
         ["--time", "9"],
         ["--time", "1", "--frame", "1"],
@@ -108,6 +109,27 @@ def test_mistakes_leave_no_picture(path: Path, options: list[str]) -> None:
     assert "\n" not in str(result.exception)
     assert result.stdout == ""
     assert [file.name for file in path.parent.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--dpi", "nan"],
+        ["-o", "a.gif", "--fps", "nan"],
+        ["-o", "a.gif", "--speed", "nan"],
+        ["-o", "a.gif", "--speed", "inf"],
+    ],
+)
+def test_what_is_no_finite_number_is_refused(path: Path, options: list[str]) -> None:
+    result = call(path, *options)
+    assert result.exit_code == 2
+    assert f"{options[-1]} is no finite number" in result.stderr
+    assert [file.name for file in path.parent.iterdir()] == ["run.h5"]
+
+
+def test_endings_that_a_sample_may_have_are_named(path: Path) -> None:
+    assert ".png, .svg, .pdf, .gif, .mp4" in str(call(path, "-o", "a.avi").exception)
+    assert ".gif" not in str(call(path, "--what", "rose", "-o", "a.avi").exception)
 
 
 def test_help_is_light_and_lists_everything() -> None:

@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner, Result
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
+from picture_checks import clashes
 from PIL import Image
 from scene_samples import axis_angle, bodies_at, box_shape, container, pair_shape, planes_of, scene_of
 
@@ -297,6 +298,12 @@ def test_check_shows_both_velocities(folder: Path) -> None:
 def test_runout_counts_all_bodies(rocks: BodyResults) -> None:
     ax = drawn(rocks, what="runout").axes[0]
     assert sum(patch.get_height() for patch in ax.patches) == 8.0
+
+
+def test_shares_at_one_place_do_not_hide_each_other(folder: Path) -> None:
+    """As of one body, whose way is that of 50 and of 90 percent."""
+    with opened(folder / "drop.h5") as results:
+        assert clashes(drawn(results, what="runout")) == []
 
 
 def test_trajectories_begin_and_end_where_the_bodies_do(rocks: BodyResults) -> None:

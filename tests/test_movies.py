@@ -275,6 +275,7 @@ def test_system_ffmpeg_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
         ("time", ["-o", "a.mp4", "--time", "1"], "an animation shows all frames"),
         ("increment", ["-o", "a.mp4", "--increment", "1"], "an animation shows all frames"),
         ("time", ["-o", "a.mp4", "--fps", "5", "--speed", "1"], "exclude each other"),
+        ("time", ["-o", "a.gif", "--fps", "60"], "50 frames a second at most"),
         ("time", ["-o", "a.png", "--fps", "5"], "--fps and --speed are for animations"),
         ("increment", ["-o", "a.gif", "--speed", "1"], "has no time; choose --fps"),
         ("time", ["-o", "a.gif", "--style", "paper"], "for pictures on a page"),

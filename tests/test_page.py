@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import json
 import math
 import re
@@ -441,7 +442,7 @@ def test_sweep(tmp_path: Path) -> None:
     cells = {cell.replace("→", "->").replace("±", "+-") for cell in read.cells}
     found = read_sweep(folder)
     for block in [
-        *sweep_text.blocks(found),
+        *sweep_text.blocks(found, width=None),
         *comparison([folder / one.file for one in found.entries if one.numbers])[0],
     ]:
         if block.title != "Warnings":
@@ -510,6 +511,27 @@ def test_command_keeps_what_is_there(tmp_path: Path) -> None:
     assert target.read_text() == "mine"
     assert CliRunner().invoke(command, [str(path), "--html", str(target), "--force"]).exit_code == 0
     assert target.read_text() != "mine"
+
+
+def test_page_is_no_folder(tmp_path: Path) -> None:
+    path = made.make_file(tmp_path / "cut.h5", stop_after=-1.0)
+    target = tmp_path / "run.html"
+    target.mkdir()
+    result = CliRunner().invoke(command, [str(path), "--html", str(target), "--force"])
+    assert "is a folder" in str(result.exception)
+    assert result.stdout == ""
+
+
+def test_page_of_a_sweep_of_one_member_has_lines_as_long_as_they_are(tmp_path: Path) -> None:
+    """The browser folds them; the text report does at its own width."""
+    axes = {swept.SHAPE: ("disc",), swept.HERTZ: ("2 Hz",)}
+    found = read_sweep(swept.make_sweep(tmp_path / "one", axes))
+    assert ": 1 member, 1 done" in sweep_page(found).subtitle
+    long = " ".join(["a word"] * 40)
+    said = dataclasses.replace(found, said=(long,))
+    rows = {width: sweep_text.blocks(said, width=width)[-1].rows for width in (None, 118)}
+    assert rows[None] == ((f"- {long}",),)
+    assert len(rows[118]) == 3
 
 
 @pytest.mark.parametrize("name", ["page.pdf", "page", "no/such/folder/page.html"])

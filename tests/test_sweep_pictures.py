@@ -14,7 +14,9 @@ import sweep_samples as made
 from click.testing import CliRunner, Result
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from picture_checks import clashes
 
+from dem_cli.cli.compare import command as compare
 from dem_cli.cli.render import command
 from dem_cli.errors import DemError, ScenarioError
 from dem_cli.report.look import DIVERGING, SEQUENTIAL, style
@@ -185,6 +187,12 @@ def test_one_run_a_point_has_no_bars(tmp_path: Path) -> None:
     assert bars(figure.axes[0]) == 0
 
 
+def test_curve_without_points_is_not_in_the_legend(tmp_path: Path) -> None:
+    grid = {made.SHAPE: ("disc", "ellipse"), made.HERTZ: ("1 Hz", "2 Hz")}
+    _, _, figure = draw(read_sweep(made.make_sweep(tmp_path / "grid", grid, failed=("ellipse-1", "ellipse-2"))), "map")
+    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["disc"]
+
+
 def test_axes_of_words_are_side_by_side(tmp_path: Path) -> None:
     grid = {"grains.bond.rolling": (True, False), made.SHAPE: ("disc", "ellipse")}
     ax = draw(read_sweep(made.make_sweep(tmp_path / "words", grid)), "map")[2].axes[0]
@@ -271,6 +279,27 @@ def test_shapes_stand_side_by_side_before_and_after(found: Sweep) -> None:
     assert [t.get_text() for t in figure.legends[0].get_texts()] == ["disc", "ellipse", "packed", "after shaking"]
 
 
+@pytest.mark.parametrize("name", ["screen", "paper", "paper-wide"])
+@pytest.mark.parametrize("what", KINDS)
+def test_labels_do_not_run_into_each_other(tmp_path: Path, what: str, name: str) -> None:
+    grid = {
+        "scenario": ("thesis-discs-400gal-10hz.toml", "thesis-pairs-400gal-10hz.toml"),
+        made.GAL: ("400 gal", "800 gal", "1200 gal"),
+        made.HERTZ: ("1 Hz", "2 Hz", "5 Hz"),
+    }
+    with style(name):
+        _, _, figure = draw(read_sweep(made.make_sweep(tmp_path / "grid", grid)), what)
+        assert clashes(figure) == []
+
+
+def test_still_surface_is_named_beside_the_axes(found: Sweep) -> None:
+    """Where no curve and no line can cross the word."""
+    _, _, figure = draw(found, "resonance")
+    (still,) = (text for text in figure.axes[0].texts if text.get_text() == "still")
+    figure.draw_without_rendering()
+    assert still.get_window_extent().x0 > figure.axes[0].bbox.x1
+
+
 def test_scenarios_are_compared_before_shapes(tmp_path: Path) -> None:
     grid = {made.SHAPE: ("disc", "ellipse"), "scenario": ("loose.toml", "dense.toml")}
     title, _, figure = draw(read_sweep(made.make_sweep(tmp_path / "files", grid)), "shapes")
@@ -352,6 +381,13 @@ def test_render_refuses_what_has_no_meaning(folder: Path, arguments: tuple[str, 
     assert isinstance(result.exception, DemError)
     assert text in str(result.exception)
     assert result.stdout == ""
+
+
+def test_compare_sends_a_sweep_to_the_report(folder: Path) -> None:
+    for path in (folder, folder / "sweep.toml"):
+        result = CliRunner().invoke(compare, [str(path)])
+        assert isinstance(result.exception, ScenarioError)
+        assert f"dem report {path}" in str(result.exception)
 
 
 def test_pictures_leave_the_report_alone(found: Sweep) -> None:

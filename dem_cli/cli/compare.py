@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from dem_cli.cli.finite import FiniteRange
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Paper: for a column of 85 mm, or two of 170 mm; 8 pt, no titles, which are printed as a caption.",
 )
-@click.option("--dpi", type=click.FloatRange(20, 1200), help="Resolution of PNG [default: 200, for paper 600].")
+@click.option("--dpi", type=FiniteRange(20, 1200), help="Resolution of PNG [default: 200, for paper 600].")
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
     files: tuple[Path, ...],
@@ -86,7 +88,11 @@ def command(
     from dem_cli.report.kinds import kind_of
     from dem_cli.report.look import check_target
     from dem_cli.report.text import show
+    from dem_cli.results.manifest import is_sweep
 
+    sweep = next((path for path in files if is_sweep(path)), None)
+    if sweep is not None:
+        raise ScenarioError(f"{sweep}: a sweep is told of by dem report {sweep}; dem compare takes result files")
     kind = kind_of(files)
     if kind == "bodies":
         raise ScenarioError("runs of bodies in 3D are compared by dem report FILE FILE ...: a row a file")

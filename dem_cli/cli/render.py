@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 
 import click
+
+from dem_cli.cli.finite import FiniteRange
 
 AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "normals", "energy-normals")
 
@@ -76,14 +79,14 @@ AT_ONE_FRAME = ("sample", "scene", "rose", "force-distribution", "forces", "norm
 )
 @click.option(
     "--fps",
-    type=click.FloatRange(0.1, 60),
+    type=FiniteRange(0.1, 60),
     help="Animation: frames of the file a second [default: as long as each lasts, 2 to 25; shear tests 10].",
 )
 @click.option(
-    "--speed", type=click.FloatRange(0, min_open=True), help="Animation: simulated seconds a second, in place of --fps."
+    "--speed", type=FiniteRange(0, min_open=True), help="Animation: simulated seconds a second, in place of --fps."
 )
 @click.option(
-    "--dpi", type=click.FloatRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80, MP4 150]."
+    "--dpi", type=FiniteRange(20, 1200), help="Resolution [default: PNG 200, for paper 600; GIF 80, MP4 150]."
 )
 @click.option("--force", is_flag=True, help="Overwrite a picture that exists.")
 def command(
@@ -226,7 +229,7 @@ def command(
     else:
         if fps or speed:
             raise ScenarioError(f"--fps and --speed are for animations: name a .gif or .mp4 with -o, not {target.name}")
-        check_target(target, force)
+        check_target(target, force, also=ENDINGS if picture.what in ("sample", "scene") else ())
     with open_results(file) as results:
         if not results.complete:
             click.echo(f"{file}: incomplete run; the picture shows what was written", err=True)
@@ -283,7 +286,7 @@ def _check_animation(
 ) -> None:
     """Raise DemError for what can be no animation, or one that would be overwritten. moment: one frame is asked for."""
     from dem_cli.errors import ScenarioError
-    from dem_cli.report.movies import check_target
+    from dem_cli.report.movies import GIF_FASTEST, check_target
 
     if what not in ("sample", "scene"):
         raise ScenarioError(
@@ -295,6 +298,8 @@ def _check_animation(
         )
     if fps and speed:
         raise ScenarioError("--fps and --speed exclude each other")
+    if fps and fps > GIF_FASTEST and target.suffix.lower() == ".gif":
+        raise ScenarioError(f"--fps {fps:g}: a GIF shows {GIF_FASTEST:g} frames a second at most; write .mp4")
     if look != "screen":
         raise ScenarioError(f"--style {look} is for pictures on a page, not for an animation")
     check_target(target, force)
@@ -309,6 +314,8 @@ def _angles(text: str) -> tuple[float, float]:
         raise ScenarioError(
             f'--view "{text}": write azimuth and elevation in degrees, for example --view -62,24'
         ) from None
+    if not math.isfinite(azimuth):
+        raise ScenarioError(f"--view {text}: the azimuth is a finite number of degrees")
     if not -90.0 <= elevation <= 90.0:
         raise ScenarioError(f"--view {text}: the elevation lies between -90 and 90 degrees")
     return azimuth, elevation
@@ -321,6 +328,8 @@ def _pair(text: str) -> tuple[float, float]:
         low, high = (float(part) for part in text.split(","))
     except ValueError:
         raise ScenarioError(f'--range "{text}": write two numbers, for example --range 0,0.05') from None
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ScenarioError(f"--range {text}: both are finite numbers")
     return low, high
 
 

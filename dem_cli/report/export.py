@@ -14,6 +14,7 @@ import numpy as np
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.shear import STATE, ShearSummary
 from dem_cli.report.summary import MEASURES, Summary
+from dem_cli.report.whole import whole
 from dem_cli.results import Results
 from dem_cli.results.schema import INCREMENTS, SERIES
 
@@ -68,11 +69,13 @@ def write_tables(tables: Mapping[str, Iterator[Row]], folder: Path, force: bool)
     paths = {name: folder / name for name in tables}
     there = [str(path) for path in paths.values() if path.exists()]
     if there and not force:
-        raise ResultsError(f"{', '.join(there)} exists; choose another folder or add --force")
+        raise ResultsError(
+            f"{', '.join(there)} {'exist' if there[1:] else 'exists'}; choose another folder or add --force"
+        )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, rows in tables.items():
-            with paths[name].open("w", newline="", encoding="utf-8") as stream:
+            with whole(paths[name]) as work, work.open("w", newline="", encoding="utf-8") as stream:
                 csv.writer(stream, lineterminator="\n").writerows(rows)
     except OSError as error:
         raise ResultsError(f"{folder}: cannot be written: {error.strerror}") from None

@@ -141,11 +141,17 @@ def draw_runout(results: BodyResults) -> Figure:
     )  # fmt: skip
     ax.set_xlabel(axis_label("horizontal distance from the start", unit))
     ax.set_ylabel("bodies")
-    for share in (50, 90):
+    # One below the other, as both may be at one place.
+    for share, height in ((50, 1.0), (90, 0.93)):
         value = float(np.percentile(distance, share))
         ax.axvline(value, color=COLORS[1], lw=1.0, ls=(0, (4, 2)))
         ax.annotate(
-            f" {share} %", (value, 1.0), xycoords=("data", "axes fraction"), va="top", color=COLORS[1], fontsize=small()
+            f" {share} %",
+            (value, height),
+            xycoords=("data", "axes fraction"),
+            va="top",
+            color=COLORS[1],
+            fontsize=small(),
         )
     right = ax.twinx()
     right.spines["right"].set_visible(True)

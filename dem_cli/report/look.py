@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dem_cli.errors import ResultsError, ScenarioError
+from dem_cli.report.whole import whole
 from dem_cli.state import Floats
 
 if TYPE_CHECKING:
@@ -210,12 +211,12 @@ def new_figure(width: float, height: float, *, rigid: bool = False, page: bool =
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def check_target(path: Path, force: bool) -> None:
+def check_target(path: Path, force: bool, also: Sequence[str] = ()) -> None:
     """Raise ScenarioError if `path` has an unknown ending, ResultsError if it would be overwritten without
-    `force`.
+    `force`. also: endings that other pictures of the kind may have.
     """
     if path.suffix.lower() not in ENDINGS:
-        raise ScenarioError(f"{path}: a picture's name must end in {', '.join(ENDINGS)}")
+        raise ScenarioError(f"{path}: a picture's name must end in {', '.join((*ENDINGS, *also))}")
     if path.exists() and not force:
         raise ResultsError(f"{path} exists; choose another name with -o or add --force")
 
@@ -234,7 +235,8 @@ def save(figure: Figure, path: Path, dpi: float) -> None:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         try:
-            figure.savefig(path, dpi=dpi, metadata=metadata)
+            with whole(path) as work:
+                figure.savefig(work, dpi=dpi, metadata=metadata, format=ending[1:])
         except OSError as error:
             raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
 

@@ -22,6 +22,7 @@ ENDINGS = (".gif", ".mp4")
 SLOWEST, FASTEST = 2.0, 25.0  # frames a second, where none are asked for
 INCREMENTS_A_SECOND = 10.0  # of quasi-static tests, likewise
 RATE = {".gif": 25.0, ".mp4": 30.0}  # of films that follow simulated time [1/s]
+GIF_FASTEST = 50.0  # frames a second: browsers slow down what is shorter than two hundredths of a second
 LONGEST = 3600.0  # s
 PALETTE_FRAMES = 5  # of a GIF, that its colours are taken from
 NO_FFMPEG = "no ffmpeg: pip install 'dem-cli[movie]', or write .gif"

@@ -256,7 +256,7 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
         points.sort()
         ax.plot(
             [x for x, _ in points], [y for _, y in points], color=color, marker=marker, ms=5.0,
-            ls=line if axis.values is not None else "", label=label or None, zorder=3, transform=where,
+            ls=line if axis.values is not None else "", label=label if points else None, zorder=3, transform=where,
         )  # fmt: skip
     if axis.values is not None:
         ax.set_xticks(axis.values, axis.texts)
@@ -267,5 +267,5 @@ def _curves(found: Sweep, axes: list[Axis], measure: Measure) -> Figure:
     ax.set_ylim(*fit(min(reached), max(reached)))
     ax.set_xlabel(axis.label, parse_math=False)
     ax.set_ylabel(_sense(found.main), parse_math=False)
-    legend_below(figure, ax)
+    legend_below(figure, ax, 1 if len(groups) > 1 else 2)
     return figure

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 APART = 1.05  # ratio of the longest period over T1 to the shortest below which there is no curve
+LINE, SHORT = 0.3, 2  # height [inch] for each curve that the legend names beyond a few
 WIDE = 4.0  # ratio of the longest period to the shortest from which their axis is logarithmic
 CAPTION = (
     "Amplitude of the first antisymmetric mode of the free surface, cos(pi x/l), at the driving frequency: the sine that fits it best "
@@ -40,7 +41,7 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
     ratios = [case.estimate("period_ratio").mean for cases in groups.values() for case in cases]
     if max(ratios) < APART * min(ratios):
         raise ScenarioError("--what resonance: all members are shaken at the same period over T1; vary the frequency")
-    figure = new_figure(6.4, 6.2)
+    figure = new_figure(6.4, 6.2 + LINE * max(0, len(groups) - SHORT))
     top, bottom = figure.subplots(2, 1, sharex=True)
     panels = ((top, "driven_amplitude", 1e3), (bottom, "driven_ratio", 1.0))
     for k, (label, cases) in enumerate(groups.items()):
@@ -49,8 +50,8 @@ def draw_resonance(found: Sweep) -> tuple[str, str, Figure]:
     quiet = max(case.estimate("quiet").mean for cases in groups.values() for case in cases)
     top.axhline(1e3 * quiet, color="0.6", lw=0.8, ls=":", zorder=1)
     top.annotate(
-        "still", (0.995, 1e3 * quiet), xycoords=top.get_yaxis_transform(), xytext=(0.0, 1.5), textcoords="offset points",
-        ha="right", va="bottom", fontsize=7, color="0.4",
+        "still", (1.0, 1e3 * quiet), xycoords=top.get_yaxis_transform(), xytext=(3.0, 0.0), textcoords="offset points",
+        ha="left", va="center", fontsize=7, color="0.4",
     )  # fmt: skip
     top.set_ylabel("amplitude of the surface [mm]")
     bottom.set_ylabel("over that of the ground")

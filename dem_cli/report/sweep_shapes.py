@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+LINE = 0.17  # height of a line of the legend [inch]
+FILLED = 0.8  # share of a figure's width that its panels take
 APART = 0.5  # from one group to the next, in places of a shape
 SHAPES = ("grains.shape", "grains.aspect_ratio", "grains.template", "grains.bond")
 
@@ -53,11 +55,17 @@ def draw_shapes(found: Sweep) -> tuple[str, str, Figure]:
         panels[1].axhline(0.0, color="0.6", lw=0.8, zorder=1)
     bottom = panels[-1]
     middles = [g * (count + APART) + 0.5 * (count - 1) for g in range(len(groups))]
-    bottom.set_xticks(middles, [label.replace(", ", "\n") for label in groups], parse_math=False)
+    upright = _name_groups(bottom, middles, list(groups), figure.get_figwidth())
     bottom.tick_params(axis="x", length=0)
     bottom.set_xlim(-0.5 - APART, middles[-1] + 0.5 * count + APART)
     figure.align_ylabels()
-    figure.legend(handles=_legend(axis, shaken), loc="outside lower center", ncols=min(4, count + 2 * shaken))
+    letters = look.LETTERS[look.current().titles]
+    longest = max(len(axis.words(k)) for k in range(count))
+    columns = max(1, int(figure.get_figwidth() / (0.5 + (longest + 1) / letters)))
+    entries = _legend(axis, shaken)
+    figure.legend(handles=entries, loc="outside lower center", ncols=min(4, columns))
+    more = LINE * (-(-len(entries) // min(4, columns)) - 1) + (max(map(len, groups)) / letters if upright else 0.0)
+    figure.set_figheight(min(figure.get_figheight() + more, look.HIGHEST))
     what = "Scenarios" if axis.keys == (SCENARIO,) else "Shapes" if axis.keys[0].startswith(SHAPES) else axis.name
     title = f"{what} side by side"
     look.title(figure, title)
@@ -65,6 +73,17 @@ def draw_shapes(found: Sweep) -> tuple[str, str, Figure]:
         "void ratio packed (open) and after shaking (full), and its change" if shaken else MEASURES[found.main].label
     )
     return title, f"Mean over seeds of the {state}; {BARS}.", figure
+
+
+def _name_groups(ax: Axes, middles: list[float], labels: list[str], width: float) -> bool:
+    """Below each group what it is, a line for each axis; upright, and True, where that is too wide for the figure's `width` [inch]."""
+    longest = max((len(line) for label in labels for line in label.split(", ")), default=0)
+    upright = longest > FILLED * width / len(labels) * look.LETTERS[look.current().titles]
+    if upright:
+        ax.set_xticks(middles, labels, rotation=90, parse_math=False)
+    else:
+        ax.set_xticks(middles, [label.replace(", ", "\n") for label in labels], parse_math=False)
+    return upright
 
 
 def _axis(found: Sweep) -> Axis | None:
@@ -100,7 +119,9 @@ def _mark(ax: Axes, x: float, case: SweepCase, name: str, color: str, marker: st
     value, factor = case.estimate(name), MEASURES[name].factor
     if value.n:
         bars(ax, x, value, factor, color)
-        ax.plot(x, factor * value.mean, ls="", marker=marker, ms=5.5, mec=color, mfc=face or color, zorder=3)
+        ax.plot(
+            x, factor * value.mean, ls="", marker=marker, ms=look.mark_size(5.5), mec=color, mfc=face or color, zorder=3
+        )
     elif not case.counts.get("done"):
         place = ax.get_xaxis_transform()
         text = " ".join(case.counts)

@@ -19,26 +19,34 @@ WIDTH = 118  # of running text
 CONFIDENCE = "mean +- half of its 95 % interval"
 
 
-def blocks(found: Sweep, *, each: bool = False) -> list[Block]:
-    """The tables of a sweep; with `each` a row for every member too, if there are several in a case."""
+def blocks(found: Sweep, *, each: bool = False, width: int | None = WIDTH) -> list[Block]:
+    """The tables of a sweep; with `each` a row for every member too, if there are several in a case. width: letters that running text is
+    folded to, None for lines as long as they are.
+    """
     shown = [_head(found)]
     best = best_point(found)
     if best is not None:
-        shown.append(Block("Best point", (), _wrapped(lines(best))))
+        shown.append(Block("Best point", (), _wrapped(lines(best), width)))
     for kind in found.kinds:
         for title, names in tables_of(found, kind):
             shown.append(_pooled(found, kind, title, names))
             if each and found.repeated:
                 shown.append(_each(found, kind, f"{title}: each run", names))
-    shown += [_failed(found), _waiting(found), Block("Warnings", (), _wrapped([f"- {line}" for line in found.said]))]
+    shown += [
+        _failed(found),
+        _waiting(found),
+        Block("Warnings", (), _wrapped([f"- {line}" for line in found.said], width)),
+    ]
     return [block for block in shown if block.rows]
 
 
-def _wrapped(texts: Sequence[str]) -> tuple[tuple[str], ...]:
+def _wrapped(texts: Sequence[str], width: int | None) -> tuple[tuple[str], ...]:
+    if width is None:
+        return tuple((text,) for text in texts)
     return tuple(
         (part,)
         for text in texts
-        for part in textwrap.wrap(text, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+        for part in textwrap.wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
     )
 
 

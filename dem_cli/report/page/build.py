@@ -233,7 +233,7 @@ def shown_member(found: Sweep) -> tuple[Entry | None, str]:
 
 
 def _of_sweep(found: Sweep, shown: Results | None, label: str) -> Page:
-    head, *tables = [block for block in sweep_text.blocks(found) if block.title != "Warnings"]
+    head, *tables = [block for block in sweep_text.blocks(found, width=None) if block.title != "Warnings"]
     with style():
         drawings = [
             drawing(figure, title, caption, f"{title}: {caption}") for title, caption, figure in pictures_of(found)
@@ -252,11 +252,12 @@ def _of_sweep(found: Sweep, shown: Results | None, label: str) -> Page:
     manifest = Listing("The sweep, sweep.toml", (found.folder / NAME).read_text(encoding="utf-8"))
     sections.append(Section("Scenario and provenance", (*(_sources(shown) if shown else ()), manifest)))
     count = len(found.entries)
+    members_text = "1 member" if count == 1 else f"{count} members"
     missing = [f"{found.counts[state]} {state}" for state in ("waiting", "failed") if found.counts[state]]
     return Page(
         title=found.title or found.folder.name,
-        subtitle=f"Sweep of {found.scenario}: {count} members, {found.counts['done']} done",
-        banners=(f"Incomplete sweep: of {count} members {' and '.join(missing)}.",) if missing else (),
+        subtitle=f"Sweep of {found.scenario}: {members_text}, {found.counts['done']} done",
+        banners=(f"Incomplete sweep: of {members_text} {' and '.join(missing)}.",) if missing else (),
         warnings=tuple(found.said),
         sections=tuple(section for section in sections if section.parts),
     )

@@ -12,6 +12,7 @@ from typing import Any
 from dem_cli import __version__
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.page.model import Page
+from dem_cli.report.whole import whole
 
 ENDINGS = (".html", ".htm")
 SCRIPTS = ("codec.js", "colors.js", "contacts.js", "grains.js", "bodies.js", "controls.js", "player.js", "page.js")
@@ -24,6 +25,8 @@ def check_page(path: Path, force: bool) -> None:
         raise ScenarioError(f"{path}: a page's name must end in {' or '.join(ENDINGS)}")
     if not path.parent.is_dir():
         raise ResultsError(f"{path}: there is no folder {path.parent}")
+    if path.is_dir():
+        raise ResultsError(f"{path}: is a folder; choose another name")
     if path.exists() and not force:
         raise ResultsError(f"{path} exists; choose another name or add --force")
 
@@ -32,7 +35,8 @@ def write_page(page: Page, path: Path) -> None:
     """Write it; the same page gives the same bytes. ResultsError if that is not possible."""
     text = html(page)
     try:
-        path.write_text(text, encoding="utf-8", newline="\n")
+        with whole(path) as work:
+            work.write_text(text, encoding="utf-8", newline="\n")
     except OSError as error:
         raise ResultsError(f"{path}: cannot be written: {error.strerror}") from None
 
