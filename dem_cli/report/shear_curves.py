@@ -385,7 +385,7 @@ def draw_one(results: Results, what: str, number: int | None) -> Figure:
     else:
         panel_share(ax, one)
     heading(figure, results, f"{titles[what]}, {_stage_text(results, number)}")
-    notes = ["dots: peak of s1/s2"] if one.peak is not None else []
+    notes = ["dot: peak of s1/s2"] if one.peak is not None else []
     if what == "dilatancy":
         notes.append(f"slope over {2 * SLOPE_ROWS + 1} increments")
     if what in ("dilatancy", "dissipation", "largest-share") and np.any(one.rows["event"] > 0):
