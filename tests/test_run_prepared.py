@@ -172,6 +172,12 @@ def test_rows_lie_at_cache_lines_again(tmp_path: Path) -> None:
     assert tmp_path.exists()
 
 
+def by_name(module: str, name: str) -> bytes:
+    """A pickle of what a module has under a name, also one with dots."""
+    texts = b"".join(b"\x8c" + bytes([len(text)]) + text.encode() for text in (module, name))
+    return b"\x80\x04" + texts + b"\x93."
+
+
 class Strange:
     """What somebody might put into a file for us to run."""
 
@@ -183,6 +189,10 @@ class Strange:
     ("data", "why"),
     [
         (pickle.dumps(Strange()), "builtins.print does not belong to the state of an engine"),
+        (by_name("dem_cli.sweep.process", "WorkerProcess"), "does not belong to the state of an engine"),
+        (by_name("dem_cli.engines.schedule", "Output"), "does not belong to the state of an engine"),
+        (by_name("dem_cli.sweep.process", "subprocess.Popen"), "does not belong to the state of an engine"),
+        (by_name("dem_cli.engines.impulse.engine", "Callable.__class__"), "does not belong to the state of an engine"),
         (pickle.dumps(parse_scenario), "does not belong to the state of an engine"),
         (pickle.dumps(np.array([1.0])), "is none of an engine"),
         (b"abc", "cannot be read"),

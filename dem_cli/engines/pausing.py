@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 from dem_cli.errors import ResultsError
 
 FROM_NUMPY = {"_reconstruct", "ndarray", "dtype", "scalar", "_frombuffer"}
+OWN = ("dem_cli.engines.", "dem_cli.assembly", "dem_cli.state", "dem_cli.rigid")  # modules of what engines consist of
 FROM_ELSEWHERE = {("collections", "deque"), ("builtins", "frozenset"), ("builtins", "set")}
 
 
@@ -36,11 +37,12 @@ class _Reader(pickle.Unpickler):
     """Reads arrays and the classes of this program; nothing that a strange file might want to call."""
 
     def find_class(self, module: str, name: str) -> Any:
-        found = super().find_class(module, name) if module.split(".")[0] in ("dem_cli", "numpy") else None
-        own = module.startswith("dem_cli.") and isinstance(found, type)
-        if own or (module.startswith("numpy") and name in FROM_NUMPY):
-            return found
-        if (module, name) in FROM_ELSEWHERE:
+        # The name must be that of a class made there: a module hands out what it imports, too, also by a name with dots.
+        if module.startswith(OWN) and name.isidentifier():
+            found = super().find_class(module, name)
+            if isinstance(found, type) and found.__module__ == module:
+                return found
+        elif (module.split(".")[0] == "numpy" and name in FROM_NUMPY) or (module, name) in FROM_ELSEWHERE:
             return super().find_class(module, name)
         raise pickle.UnpicklingError(f"{module}.{name} does not belong to the state of an engine")
 
