@@ -18,7 +18,7 @@ LONGEST = 400
 
 # A layer is a file or folder of dem_cli; it imports itself and those named here, and nothing else of dem_cli.
 # cli > sweep > run > (assembly, engines, results) > (scenario, state) > errors, and report > (results, analysis).
-BASE = {"errors", "units"}
+BASE = {"errors", "units", "whole"}
 STARTS = BASE | {"scenario", "state", "rigid"}
 MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
@@ -34,6 +34,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "analysis": {"errors", "state", "rigid", "geometry", "jit"},
     "report": BASE | {"results", "analysis", "state", "rigid"},
     "interrupts": set(),
+    "whole": set(),
     "pace": STARTS,
     "run": STARTS | {"assembly", "engines", "results", "analysis", "interrupts"},
     "sweep": STARTS | {"run", "results", "pace"},

@@ -13,7 +13,7 @@ from dem_cli.report.export import write_tables
 from dem_cli.report.look import new_figure, save
 from dem_cli.report.page.model import Page
 from dem_cli.report.page.render import write_page
-from dem_cli.report.whole import whole
+from dem_cli.whole import whole
 
 WRITERS: dict[str, Callable[[Path], object]] = {
     "a.png": lambda path: save(new_figure(2.0, 1.0), path, 50),

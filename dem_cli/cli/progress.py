@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any
 
+from dem_cli.cli.bars import Bars
 from dem_cli.pace import pace_of
 from dem_cli.rigid import BodyFrame
 from dem_cli.scenario import ImpulseScenario, QuasiStaticScenario, Scenario
@@ -17,51 +17,34 @@ PACKING_EVERY = 1.0  # s that a packing takes until it is shown, and between two
 DRAW_EVERY = 0.2  # s between two updates of the bar
 
 
-class Progress:
+class Progress(Bars):
     """A listener of `run_scenario`; a context manager. verbosity -1: silent."""
 
     def __init__(self, scenario: Scenario | QuasiStaticScenario | ImpulseScenario, verbosity: int = 0) -> None:
+        super().__init__(verbosity)
         self.scenario = scenario
         self.pace = pace_of(scenario)
-        self.silent = verbosity < 0
         self._began = self._shown = time.monotonic()
-        self._bar: Any = None
         self._task: Any = None
 
-    def __enter__(self) -> Self:
-        if not self.silent and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, TextColumn
-            from rich.progress import Progress as Bar
+    def make(self, console: Any) -> Any:
+        from rich.progress import BarColumn, TextColumn
+        from rich.progress import Progress as Bar
 
-            columns = (TextColumn("{task.description}"), BarColumn(bar_width=None), TextColumn("{task.fields[words]}"))
-            self._bar = Bar(*columns, console=Console(stderr=True), transient=True)
-            self._bar.start()
-            self._task = self._bar.add_task("starting", total=1.0, words="")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar:
-            self._bar.stop()
-
-    def say(self, text: str) -> None:
-        """A line for the reader, above the bar if there is one."""
-        if self.silent:
-            return
-        if self._bar:
-            self._bar.console.print(text, markup=False, highlight=False)
-        else:
-            print(text, file=sys.stderr, flush=True)
+        columns = (TextColumn("{task.description}"), BarColumn(bar_width=None), TextColumn("{task.fields[words]}"))
+        bar = Bar(*columns, console=console, transient=True)
+        self._task = bar.add_task("starting", total=1.0, words="")
+        return bar
 
     def packing(self, words: str) -> None:
         """Told what the packing is at; shown once it has taken a second, and then as often as a run is."""
         now = time.monotonic()
-        if self.silent or now - self._shown < (DRAW_EVERY if self._bar else PACKING_EVERY):
+        if self.silent or now - self._shown < (DRAW_EVERY if self.bar else PACKING_EVERY):
             return
         if now - self._began > PACKING_EVERY:
             self._shown = now
-            if self._bar:
-                self._bar.update(self._task, description="packing", words=words)
+            if self.bar:
+                self.bar.update(self._task, description="packing", words=words)
             else:
                 self.say(f"[packing] {words}")
 
@@ -74,10 +57,10 @@ class Progress:
         if state.stage_end and pace.row:
             self.say(f"stage {head}: {pace.reached(state, pace.row)}: {state.stop_reason}")
         now = time.monotonic()
-        if not self.silent and pace.count(state) > 0 and now - self._shown >= (DRAW_EVERY if self._bar else LOG_EVERY):
+        if not self.silent and pace.count(state) > 0 and now - self._shown >= (DRAW_EVERY if self.bar else LOG_EVERY):
             self._shown = now
             words = pace.words(state)
-            if self._bar:
-                self._bar.update(self._task, description=head, completed=pace.share(state), words=words)
+            if self.bar:
+                self.bar.update(self._task, description=head, completed=pace.share(state), words=words)
             else:
                 self.say(f"[{head}] {words}")

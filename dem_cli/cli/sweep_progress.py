@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import time
-from typing import Any, Self
+from typing import Any
 
+from dem_cli.cli.bars import Bars
 from dem_cli.pace import clock
 from dem_cli.sweep.drive import Tally
 
@@ -13,47 +13,30 @@ LOG_EVERY = 10.0  # s of wall time between two lines in a log
 MOST_BARS = 16  # of members that run at a time; a cluster may have hundreds
 
 
-class SweepProgress:
+class SweepProgress(Bars):
     """A watcher of a sweep; a context manager. verbosity -1: silent."""
 
     def __init__(self, verbosity: int = 0) -> None:
-        self.silent = verbosity < 0
+        super().__init__(verbosity)
         self._logged = time.monotonic()
-        self._bar: Any = None
         self._whole: Any = None
         self._members: dict[str, Any] = {}
 
-    def __enter__(self) -> Self:
-        if not self.silent and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, Progress, TextColumn
-            from rich.table import Column
+    def make(self, console: Any) -> Any:
+        from rich.progress import BarColumn, Progress, TextColumn
+        from rich.table import Column
 
-            columns = (
-                TextColumn("{task.description}", table_column=Column(no_wrap=True, max_width=40)),
-                BarColumn(bar_width=20),
-                TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
-            )
-            self._bar = Progress(*columns, console=Console(stderr=True), transient=True, expand=True)
-            self._bar.start()
-            self._whole = self._bar.add_task("sweep", total=1.0, words="")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar:
-            self._bar.stop()
-
-    def say(self, text: str) -> None:
-        """A line for the reader, above the bars if there are any."""
-        if self.silent:
-            return
-        if self._bar:
-            self._bar.console.print(text, markup=False, highlight=False)
-        else:
-            print(text, file=sys.stderr, flush=True)
+        columns = (
+            TextColumn("{task.description}", table_column=Column(no_wrap=True, max_width=40)),
+            BarColumn(bar_width=20),
+            TextColumn("{task.fields[words]}", table_column=Column(no_wrap=True, overflow="ellipsis", ratio=1)),
+        )
+        bar = Progress(*columns, console=console, transient=True, expand=True)
+        self._whole = bar.add_task("sweep", total=1.0, words="")
+        return bar
 
     def show(self, tally: Tally) -> None:
-        if self._bar:
+        if self.bar:
             self._draw(tally)
         elif not self.silent and time.monotonic() - self._logged >= LOG_EVERY:
             self._logged = time.monotonic()
@@ -64,14 +47,14 @@ class SweepProgress:
     def _draw(self, tally: Tally) -> None:
         known = tally.total - tally.open
         begun = sum(job.share for job in tally.running if job.member)
-        self._bar.update(self._whole, completed=(known + begun) / max(tally.total, 1), words=told(tally))
+        self.bar.update(self._whole, completed=(known + begun) / max(tally.total, 1), words=told(tally))
         shown = {job.key: job for job in tally.running[:MOST_BARS]}
         for key in [key for key in self._members if key not in shown]:
-            self._bar.remove_task(self._members.pop(key))
+            self.bar.remove_task(self._members.pop(key))
         for key, job in shown.items():
             if key not in self._members:
-                self._members[key] = self._bar.add_task(job.name, total=1.0, words="")
-            self._bar.update(self._members[key], completed=job.share, words=job.words or "starting")
+                self._members[key] = self.bar.add_task(job.name, total=1.0, words="")
+            self.bar.update(self._members[key], completed=job.share, words=job.words or "starting")
 
 
 def told(tally: Tally) -> str:

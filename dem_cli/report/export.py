@@ -14,9 +14,9 @@ import numpy as np
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.shear import STATE, ShearSummary
 from dem_cli.report.summary import MEASURES, Summary
-from dem_cli.report.whole import whole
 from dem_cli.results import Results
 from dem_cli.results.schema import INCREMENTS, SERIES
+from dem_cli.whole import whole
 
 Row = Sequence[object]
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from dem_cli.errors import ResultsError, ScenarioError
-from dem_cli.report.whole import whole
 from dem_cli.state import Floats
+from dem_cli.whole import whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
@@ -15,6 +14,7 @@ import numpy.typing as npt
 
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.state import Floats
+from dem_cli.whole import whole
 
 Image = npt.NDArray[np.uint8]  # (height, width, 3)
 
@@ -89,14 +89,11 @@ def find_ffmpeg() -> str:
 
 def write(path: Path, reel: Reel, draw: Callable[[int], Image]) -> None:
     """Draw each frame of the reel and write the film as the ending of `path` says (one of ENDINGS). ResultsError if that is not possible."""
-    work = path.with_name(f".{path.name}.partial")
     try:
-        (_write_mp4 if path.suffix.lower() == ".mp4" else _write_gif)(work, reel, draw)
-        os.replace(work, path)
+        with whole(path) as work:
+            (_write_mp4 if path.suffix.lower() == ".mp4" else _write_gif)(work, reel, draw)
     except OSError as error:
         raise ResultsError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        work.unlink(missing_ok=True)
 
 
 def _write_gif(path: Path, reel: Reel, draw: Callable[[int], Image]) -> None:

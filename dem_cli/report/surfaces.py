@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from dem_cli.report.solids import hull, icosphere
 from dem_cli.results import BodyResults
 from dem_cli.rigid import Shape, Terrain
 from dem_cli.state import Floats, Ints
+from dem_cli.whole import whole
 
 GROUPS = ("Vertices", "Lines", "Polygons", "Strips")
 SPHERE = 2  # subdivisions of the spheres of a clump
@@ -52,15 +52,12 @@ def write_vtk(results: BodyResults, path: Path, force: bool = False) -> tuple[in
     moving = [surfaces[k][1] + first[n] for n, k in enumerate(bodies.shape.tolist())]
     triangles = np.concatenate([*moving, fixed_triangles + first[-1]]).astype(np.int64)
     owner = np.repeat(np.arange(len(bodies)), [len(part) for part in moving])
-    work = path.with_name(f".{path.name}.partial")
     try:
-        with h5py.File(work, "w") as file:
+        with whole(path) as work, h5py.File(work, "w") as file:
             root = _create(file, results, triangles, len(fixed_points) + int(first[-1]))
             for k in range(results.n_frames):
                 _write_frame(root, results, k, surfaces, first, owner, fixed_points)
-        os.replace(work, path)
     except OSError as error:
-        work.unlink(missing_ok=True)
         raise ResultsError(f"{path}: cannot be written: {error.strerror or error}") from None
     return results.n_frames, len(triangles)
 

@@ -16,6 +16,7 @@ from typing import Any, Literal
 import tomli_w
 
 from dem_cli.errors import ResultsError
+from dem_cli.whole import whole
 
 NAME = "sweep.toml"
 FORMAT, FORMAT_VERSION = "dem-cli sweep", 1
@@ -147,17 +148,10 @@ def write_manifest(manifest: Manifest) -> None:
         ],
         "member": [_of_member(member) for member in manifest.members],
     }
-    target = manifest.folder / NAME
-    fresh = target.with_name(f".{NAME}.{os.getpid()}")
-    try:
-        with fresh.open("w", encoding="utf-8") as handle:
-            handle.write(HEAD + tomli_w.dumps(content))
-            handle.flush()
-            os.fsync(handle.fileno())
-        os.replace(fresh, target)
-    except OSError:
-        fresh.unlink(missing_ok=True)
-        raise
+    with whole(manifest.folder / NAME) as fresh, fresh.open("w", encoding="utf-8") as handle:
+        handle.write(HEAD + tomli_w.dumps(content))
+        handle.flush()
+        os.fsync(handle.fileno())
 
 
 def _of_member(member: Member) -> dict[str, Any]:

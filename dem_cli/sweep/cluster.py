@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import logging
-import os
 import queue
 import secrets
 import shutil
@@ -30,6 +29,7 @@ from dem_cli.scenario.overrides import apply_overrides
 from dem_cli.sweep.process import Tell, WorkerProcess
 from dem_cli.sweep.task import Answer, Task
 from dem_cli.sweep.worker import disk_is_full
+from dem_cli.whole import whole
 
 CONNECT = 15.0  # s until a scheduler must have answered
 COUNT_EVERY = 2.0  # s between two counts of workers
@@ -210,14 +210,8 @@ def _unpack(task: Task, answer: Answer) -> None:
     """Write what came back to where it belongs, each file in one step."""
     for name in (task.target, task.state):
         if name and Path(name).name in answer.content:
-            target = Path(name)
-            fresh = target.with_name(f".{target.name}.{os.getpid()}")
-            try:
-                fresh.write_bytes(answer.content[target.name])
-                os.replace(fresh, target)
-            except OSError:
-                fresh.unlink(missing_ok=True)
-                raise
+            with whole(Path(name)) as fresh:
+                fresh.write_bytes(answer.content[Path(name).name])
 
 
 # -- on the worker ------------------------------------------------------------------------------------------------------

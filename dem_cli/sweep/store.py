@@ -111,7 +111,7 @@ class Store:
     def discard_preparations(self, keys: Collection[str]) -> None:
         """Remove preparations but those of `keys`: of a scenario or a program that has changed since, nothing goes on from them."""
         for path in (self.folder / INNER / "preparations").iterdir():
-            if path.name.partition(".")[0] not in keys:
+            if path.name.lstrip(".").partition(".")[0] not in keys:  # those that are being written begin with a dot
                 path.unlink(missing_ok=True)
 
     def discard_partial(self, member: Member) -> None:

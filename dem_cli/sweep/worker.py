@@ -22,6 +22,7 @@ from typing import Any, TextIO
 from dem_cli.errors import DemError, RunError, ScenarioError
 from dem_cli.results.provenance import program_identity
 from dem_cli.sweep.task import Answer, Task
+from dem_cli.whole import whole
 
 TELL_EVERY = 0.5  # s between two words on how far a member is
 IDLE = 60.0  # s without a task after which the process ends; a new one is started when there is work again
@@ -97,10 +98,8 @@ def _run(task: Task, tell: Callable[[float, str], None]) -> None:
     found = prepare_scenario(
         scenario, task.stages, target, listener=told, packing_listener=told.packing, prepared=prepared
     )
-    state = Path(task.state)
-    fresh = state.with_name(f"{state.name}.{os.getpid()}")
-    fresh.write_bytes(found.state)
-    os.replace(fresh, state)
+    with whole(Path(task.state)) as fresh:
+        fresh.write_bytes(found.state)
 
 
 def disk_is_full(error: BaseException | None) -> bool:

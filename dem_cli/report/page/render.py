@@ -12,7 +12,7 @@ from typing import Any
 from dem_cli import __version__
 from dem_cli.errors import ResultsError, ScenarioError
 from dem_cli.report.page.model import Page
-from dem_cli.report.whole import whole
+from dem_cli.whole import whole
 
 ENDINGS = (".html", ".htm")
 SCRIPTS = ("codec.js", "colors.js", "contacts.js", "grains.js", "bodies.js", "controls.js", "player.js", "page.js")

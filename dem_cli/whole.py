@@ -12,7 +12,7 @@ from pathlib import Path
 def whole(path: Path) -> Iterator[Path]:
     """Where to write; it becomes `path`, or what a link there points to, once the block ends, and goes if the block fails."""
     target = path.resolve()
-    work = target.with_name(f".{target.name}.partial")
+    work = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:
         yield work
         os.replace(work, target)
